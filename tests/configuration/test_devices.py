@@ -342,11 +342,17 @@ BO_ 258 NEST: 8 S
  SG_ BOOK M : 0|8@1+ (1,0) [0|0] "" X
  SG_ PAGE m1M : 8|8@1+ (1,0) [0|0] "" X
  SG_ ANGLE m2 : 16|16@1- (0.001,0) [0|0] "rad" X
+BO_ 259 STATE: 8 S
+ SG_ OF : 0|4@1- (1,0) [0|0] "" X
+ SG_ FIX : 4|4@1+ (1,0) [0|0] "" X
+ SG_ BARE : 8|8@1+ (1,0) [0|0] "" X
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 10000;
 BA_DEF_DEF_ "GenMsgCycleTime" 0;
 BA_ "GenMsgCycleTime" BO_ 256 20;
 SG_MUL_VAL_ 258 PAGE BOOK 1-1;
 SG_MUL_VAL_ 258 ANGLE PAGE 2-2;
+VAL_ 259 OF 3 "VALID" 0 "STARTS" -1 "SPOILT" ;
+VAL_ 259 FIX 2 "3D fix" 1 "2D" ;
 """
 
 
@@ -357,6 +363,9 @@ def inertial(folder, **changes):
         "signals": {"roll_rad": {"from": "a.ANGLE"}, "roll_rate_rad_s": {"from": "b.TURN"}},
         "protection": {"unchanged_ms": 100}, "accept_unprotected": True, **changes,
     }  # fmt: skip
+
+
+STATE = {"messages": {"a": "IMU", "b": "IMU", "s": "STATE"}}
 
 
 def test_contents_that_share_an_identifier_are_told_apart(tmp_path):
@@ -404,10 +413,24 @@ def test_what_is_encoded_of_a_shared_identifier_has_its_selector(tmp_path):
         ({"valid_when": [{"from": "a.PAGE", "mask": 3, "in": [0, 4]}]}, "in has 4, and the bits"),
         ({"valid_when": [{"from": "a.PAGE", "in": [-1]}]}, "in has -1, and .* without sign"),
         ({"valid_when": [{"from": "a.PAGE", "mask": 0x300, "in": [0]}]}, "0x300 has none of the"),
+        ({**STATE, "valid_when": [{"from": "s.OF", "in": ["valid"]}]},
+         "names no value valid of s.OF: there are VALID, STARTS, SPOILT"),
+        ({**STATE, "valid_when": [{"from": "s.BARE", "in": [1, "GOOD"]}]},
+         "names no value GOOD of s.BARE: give its number"),
+        ({**STATE, "valid_when": [{"from": "s.O", "in": ["VALID"]}]}, "of s.O: there is no such s"),
+        ({**STATE, "valid_when": [{"from": "s.FIX", "in": ["4D"]}]}, "as 18 or 0x12, got '4D'"),
+        ({**STATE, "valid_when": [{"from": "s.OF", "in": [True]}]}, "is true, as YAML reads on"),
     ],
 )  # fmt: skip
 def test_what_a_dbc_does_not_give_is_refused(tmp_path, changes, reason):
     assert re.search(reason, problems(tmp_path, {"motion": inertial(tmp_path, **changes)}))
+
+
+def test_a_status_may_be_given_by_its_names_in_a_dbc(tmp_path):
+    states = [{"from": "s.OF", "in": ["VALID", 1, "SPOILT"]}, {"from": "s.FIX", "in": ["3D fix"]}]
+    content = inertial(tmp_path, **STATE, valid_when=states)
+    plan = ship(tmp_path, {"motion": content}).foreign.motions[0]
+    assert [each.allowed for each in plan.messages[2].conditions] == [{3, 1, 15}, {2}]
 
 
 def test_identifiers_of_a_dbc_may_be_others_and_its_cycle_counts_where_none_is_given(tmp_path):

@@ -374,6 +374,7 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     layouts, file = _dbc_layouts(str(content["dbc"])), content["dbc"]
     meant = set(_words([content.get(key) for key in ("signals", "valid_when", "protection")]))
     messages: dict[str, dict[str, Any]] = {}
+    named: dict[str, dict[str, int]] = {}
     for name, (of, changes) in _named(content, "dbc", ".+").items():
         if of not in layouts:
             near = nearest(of, list(layouts))
@@ -387,7 +388,8 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
                 f"messages: {of} has {layout['bytes']} bytes in {file}, and comes in several "
                 "frames (fast packet, transport protocol), which are not put together"
             )
-        comes_with = layout.pop("comes_with")
+        comes_with, choices = layout.pop("comes_with"), layout.pop("choices")
+        named |= {f"{name}.{signal}": values for signal, values in choices.items()}
         used = {each: comes_with[each] for each in comes_with if f"{name}.{each}" in meant}
         if used:
             layout["only"] = _one_content(of, used, comes_with)
@@ -396,10 +398,28 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
         if "source" in content and layout["format"] == "29bit":  # so are source and priority
             layout["pgn"] = layout.pop("id") >> 8 & 0x3FFFF
         messages[name] = _otherwise(layout, changes)
+    if isinstance(given := content.get("valid_when"), list):
+        rest["valid_when"] = [_in_numbers(each, named, file) for each in given]
     cycles_ms = [each["cycle_ms"] for each in messages.values() if each.get("cycle_ms")]
     if len(cycles_ms) == len(messages) and "cycle_ms" not in rest:
         rest["cycle_ms"] = max(cycles_ms)
     return {"profile": f"{OF_A_DBC}{Path(str(file)).name}", **rest, "messages": messages}
+
+
+def _in_numbers(condition: Any, named: dict[str, dict[str, int]], file: str) -> Any:
+    """A condition with the numbers of what a DBC names (VAL_)."""
+    values = condition.get("in") if isinstance(condition, dict) else None
+    if not isinstance(values, list):
+        return condition
+    path = str(condition.get("from"))
+    known, numbers = named.get(path, {}), []
+    for each in values:
+        if isinstance(each, str) and each not in known and not each[:1].isdigit():
+            there = "give its number" if path in named else "there is no such signal"
+            there = f"there are {', '.join(known)[:200]}" if known else there
+            raise ValueError(f"valid_when: {file} names no value {each} of {path}: {there}")
+        numbers.append(known.get(each, each) if isinstance(each, str) else each)
+    return condition | {"in": numbers}
 
 
 def _words(value: Any) -> Iterator[str]:
@@ -470,6 +490,13 @@ def _layout(message: Any) -> dict[str, Any]:
         "bytes": max(message.length, 1),
         "cycle_ms": message.cycle_time or None,
         "signals": signals,
+        "choices": {
+            signal.name: {
+                str(words): number & (1 << signal.length) - 1
+                for number, words in (signal.choices or {}).items()
+            }
+            for signal in message.signals
+        },
         "comes_with": {
             signal.name: (signal.multiplexer_signal, signal.multiplexer_ids)
             for signal in message.signals

@@ -19,6 +19,9 @@ from utank_hil.dynamics.pump import Pump
 
 
 def _whole(value: Any) -> Any:
+    if isinstance(value, bool):
+        said = str(value).lower()
+        raise ValueError(f"is {said}, as YAML reads on, yes, off and no: quote a name")
     if isinstance(value, str):
         try:
             return int(value, 0)
