@@ -42,6 +42,16 @@ def test_a_ship_farther_off_than_loading_makes_her_is_not_told(factor: float, ve
     assert (found.of_sea, found.of_ship) == (verdict, verdict)
 
 
+@pytest.mark.parametrize(("factor", "verdict"), [(1.2, Verdict.GOOD), (1.6, Verdict.UNCERTAIN)])
+def test_a_ship_with_more_inertia_than_any_loading_is_not_told(factor: float, verdict: Verdict):
+    """Of 2.6 times the stiffness, a boat in following seas had a good GM of 1.9 m, not 0.7."""
+    motion, ship = motion_in(MOMENT_NM, loaded(14.4))[500:], loaded(14.4)
+    scaled = (ship.inertia_kg_m2 / factor, ship.stiffness_nm_rad / factor)
+    configured = ship.with_figures(*scaled, ship.damping_nms_rad)
+    task = replace(TASK, plant=replace(PLANT, ship=configured))
+    assert estimate(request(motion, configured), task).of_ship is verdict
+
+
 def test_a_ship_loaded_within_the_record_is_the_present_one():
     motion = motion_in(MOMENT_NM)
     loaded_m = motion_in(MOMENT_NM, loaded(14.4))

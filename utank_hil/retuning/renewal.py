@@ -12,7 +12,7 @@ from utank_hil.analysis.loop.self_tuning import CLIPPED_PEAK, self_tuned
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.control import DesignPlant
-from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
+from utank_hil.identification.motion_fit import KNOWN_SPREAD, SPREAD, MotionFit, fit_motion
 from utank_hil.retuning.answer import Refusal, RenewedLaw
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import LEAST_PERIODS
@@ -88,7 +88,9 @@ the ship, at deviations of 0.036 and more (docs/retuning.md).
 """
 FARTHEST: Final = 1.45
 """Largest ratio of the roll period found to the configured ship's, or its inverse. Loading changes
-it by some 30 %; with little pump work, a peak of the waves looks like a ship further away.
+it by some 30 %; with little pump work, a peak of the waves looks like a ship further away. So does
+the end of the waves' spectrum in following seas, to which stiffness and inertia may bend together:
+nothing is identified with an inertia that the prior excludes (`SAME`).
 """
 SEA_DEVIATION: Final = 0.2
 """Largest relative deviation of the moment's root mean square for a sea that counts as known."""
@@ -101,7 +103,8 @@ MOST_LONGER: Final = 0.1
 """Share of longer waves in the energy of the beam waves up to which there are a height and a peak.
 Chosen; no study."""
 SAME: Final = 3.0
-"""Standard deviations within which the ships of the last half and the whole record agree."""
+"""Standard deviations within which the ships of the last half and the whole record agree, and an
+inertia with its prior."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,11 +169,13 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
 
 
 def _identified(fit: MotionFit, task: EstimateTask) -> bool:
-    factor = fit.ship.natural_frequency_rad_s / task.plant.ship.natural_frequency_rad_s
+    found, given = fit.ship, task.plant.ship
+    factor = found.natural_frequency_rad_s / given.natural_frequency_rad_s
     return bool(
         fit.deviation[0] <= STIFFNESS_DEVIATION
         and fit.period_deviation <= PERIOD_DEVIATION
         and abs(np.log(factor)) <= np.log(FARTHEST)
+        and abs(np.log(found.inertia_kg_m2 / given.inertia_kg_m2)) <= SAME * SPREAD[1]
     )
 
 
