@@ -465,3 +465,36 @@ def test_the_exchange_makes_no_step_in_the_pressure() -> None:
     assert apart[0] < 1.5 * apart[1:].max() / FADE_SAMPLES
     steps = np.abs(np.diff(rig.commands))[begin - 2 :]
     assert steps[:5].max() < 0.6 * steps[FADE_SAMPLES:].max()
+
+
+@pytest.mark.parametrize(("passive_rad", "roll_rad"), [(0.01, 0.005), (0.02, 0.01), (0.05, 0.04)])
+def test_a_pump_at_its_limits_need_not_take_off_more_as_the_sea_grows(
+    passive_rad: float, roll_rad: float
+) -> None:
+    controller = Rig(None).controller
+    controller.renewed = renewed()
+    controller._baseline = WindowStatistics(0.01, 20e3, 20e3, 0.02)
+    tried = WindowStatistics(0.03, 20e3, 20e3, passive_rad)
+    assert controller._to_compare_with(tried).roll_rad == pytest.approx(roll_rad)
+
+
+def test_a_law_for_another_ship_is_compared_with_what_she_would_have_rolled() -> None:
+    """The twin of the file's ship rolled 1.4 times as much: a good law was refused."""
+    controller = Rig(None).controller
+    controller.renewed = replace(renewed(), passive_roll_rad=0.014)
+    controller._baseline = WindowStatistics(0.012, 20e3, 20e3, 0.02)
+    tried = WindowStatistics(0.01, 20e3, 20e3, 0.014)
+    assert controller._to_compare_with(tried).roll_rad == pytest.approx(0.0084)
+    for _ in range(2):
+        controller.note(estimate(ship=SLOWER))
+    assert controller._to_compare_with(tried).roll_rad == pytest.approx(0.012)
+
+
+@pytest.mark.parametrize("periods", [1.0, 2.5])
+def test_a_slow_ship_is_tried_for_as_many_rolls(periods: float) -> None:
+    slow = replace(SHIP, stiffness_nm_rad=SHIP.stiffness_nm_rad / periods**2)
+    law = law_for(2.0, 8.0)
+    tried = RenewingController(law, law.clipped(), slow, 0, CONFIG.limits, ToyRetuner(None))
+    rolls_s = slow.roll_period_s / tried.sample_time_s
+    assert tried._trial_settings.trial_s / slow.roll_period_s > 13.9
+    assert tried._least_samples / rolls_s > 2.3

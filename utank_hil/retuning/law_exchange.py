@@ -60,9 +60,6 @@ BUSY_NS: Final = 30_000_000_000
 ANOTHER_QUESTION: Final = "the retuner answered another question"
 
 _REQUESTED: Final = "ordered by the operator"
-_COMPARABLE: Final = (
-    f"the law has been in charge for {EARLIEST_VERDICT_S:g} s without a break, to compare with it"
-)
 _BUSY: Final = (RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
 _, _DESIGN, _TRIAL = _BUSY
@@ -72,7 +69,7 @@ class LawExchange(ABC):
     """A controller whose law is replaced by a better one while it runs.
 
     There are `outputs` outputs; `roll` is the index of the roll among them. The record of commands
-    and outputs has at least `history_samples`.
+    and outputs has at least `history_samples`. No law is judged before `earliest_s`.
     """
 
     def __init__(
@@ -83,6 +80,7 @@ class LawExchange(ABC):
         settings: TrialSettings | RetuningSettings,
         retuner: Retuner,
         history_samples: int = 0,
+        earliest_s: float = EARLIEST_VERDICT_S,
     ) -> None:
         self.sample_time_s = first.controller.sample_time_s
         self.state = RetuningState.IDLE
@@ -97,7 +95,7 @@ class LawExchange(ABC):
         )
         self._warm_up: WarmUp | None = None
         trial = round(settings.trial_s / self.sample_time_s)
-        self._least_samples = min(trial, round(EARLIEST_VERDICT_S / self.sample_time_s))
+        self._least_samples = min(trial, round(earliest_s / self.sample_time_s))
         # The accepted law is recorded while engaged and without pulses.
         self._accepted_window, self._trial_window = MovingWindow(trial), MovingWindow(trial)
         self._baseline: WindowStatistics = self._accepted_window.statistics
@@ -214,7 +212,9 @@ class LawExchange(ABC):
             return
         if self._accepted_window.samples < self._least_samples:
             if ordered:
-                self._log_event((f"{reason}: begins when {_COMPARABLE}",))
+                charge = f"in charge for {self._least_samples * self.sample_time_s:.0f} s"
+                why = f"begins when the law has been {charge} without a break, to compare with it"
+                self._log_event((f"{reason}: {why}",))
             return
         if not self._retuner.alive:
             self._silent_since_ns = self._silent_since_ns or self._now_ns

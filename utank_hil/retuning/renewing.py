@@ -25,7 +25,7 @@ from utank_hil.retuning.estimate import ChangeMonitor, MotionEstimate, ShipFigur
 from utank_hil.retuning.law_bank import MonitoredLaw, WarmUp
 from utank_hil.retuning.law_exchange import ANOTHER_QUESTION, RETRY_NS, LawExchange
 from utank_hil.retuning.retuner import Retuner
-from utank_hil.retuning.settings import TrialSettings
+from utank_hil.retuning.settings import EARLIEST_VERDICT_S, TrialSettings
 from utank_hil.retuning.trial import NOISE_FLOOR, WindowStatistics
 from utank_hil.sea import SlopeSpectrum
 
@@ -38,6 +38,8 @@ LONGER: Final = 1.3
 TRIAL: Final = TrialSettings(
     trial_s=180.0, roll_factor=1.25, effort_factor=1.5, answer_within_s=300.0
 )
+TRIAL_PERIODS: Final = 14.0
+"""Roll periods of a trial of a slow ship: what 180 s are of the first ship."""
 LEAST_SHARE: Final = 1e-3
 """Smallest limits of a law relative to the pump's: below, it does nothing and is ill-conditioned.
 """
@@ -134,7 +136,10 @@ class RenewingController(LawExchange):
     ) -> None:
         self._shared = isinstance(controller, GentleController)
         first = MonitoredLaw(controller, ChangeMonitor(ship))
-        super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
+        slow = max(1.0, TRIAL_PERIODS * ship.roll_period_s / TRIAL.trial_s)
+        trial = dataclasses.replace(TRIAL, trial_s=slow * TRIAL.trial_s)
+        earliest_s = slow * EARLIEST_VERDICT_S
+        super().__init__(first, len(law.model.C), roll, trial, retuner, earliest_s=earliest_s)
         self._law = law
         self._limits = limits
         self._configured = self._ship = ship
@@ -269,16 +274,21 @@ class RenewingController(LawExchange):
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
         """Return what the previous law would have had in the waves of the trial.
 
-        Roll and pressure are scaled with the roll of the passive ship, and the roll is limited to
-        it. The pressure may be the one predicted for the new law in these waves.
+        Both are scaled with the roll of the passive ship, and the roll is limited to it. In greater
+        waves the pump's limits may leave what it took off before, and no more. The pressure may be
+        the one predicted for the new law in these waves.
         """
         before, renewed = self._baseline, self.renewed
         assert renewed is not None
         passive_rad, most_pa = tried.passive_roll_rad, self._limits.pressure_pa
         roll_rad, grown, taller = before.roll_rad, 1.0, 1.0
-        if min(before.passive_roll_rad, passive_rad) > NOISE_FLOOR.roll_rad:
-            grown = passive_rad / before.passive_roll_rad
-            roll_rad = min(passive_rad, grown * roll_rad)
+        passive_before_rad = before.passive_roll_rad
+        if self.laws.accepted.monitor.change > 1.0:  # its twin was another ship
+            passive_before_rad = min(passive_before_rad, renewed.passive_roll_rad)
+        if min(passive_before_rad, passive_rad) > NOISE_FLOOR.roll_rad:
+            grown = passive_rad / passive_before_rad
+            taken_off_rad = max(0.0, passive_before_rad - roll_rad)
+            roll_rad = passive_rad - min(1.0, grown) * taken_off_rad
             taller = max(1.0, passive_rad / max(renewed.passive_roll_rad, NOISE_FLOOR.roll_rad))
         predicted_pa = taller * renewed.pressure_pa
         pressures_pa = [
