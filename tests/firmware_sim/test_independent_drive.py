@@ -197,6 +197,18 @@ def test_an_emergency_alarms_and_stops_nothing():
     assert not bench.node.measured.device_error
 
 
+def test_a_second_drive_with_its_number_ends_it_and_the_alarm_names_the_message():
+    bench, told = under_pressure(), {}
+    bench.node.telemetry.tell = lambda event, _: told.update({event.code: event.received})
+    other = Frame(1 << BUS_SHIFT | STANDARD | 0x185, bytes((0x37, 0x02, 0x0F, 0, 0, 0)))
+    for _ in range(50):
+        bench.node.receive(other, bench.run.now_ns)
+        bench.to(bench.run.now_ns / SECOND + 0.02)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.FOREIGN_SENDER)
+    assert told[Fault.FOREIGN_SENDER] == "pump: TPDO1 0x185 on can1"
+    assert abs(bench.motor.pressure_pa) < STOPPED_PA
+
+
 def test_an_emergency_after_another_is_told_too():
     """Else the alarm of the first would hide it for as long as it lasts, and ten seconds more."""
     bench, told = under_pressure(), []

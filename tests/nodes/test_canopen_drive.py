@@ -10,7 +10,7 @@ import pytest
 from tests.nodes.canopen_peers import PROFILE, PUMP, Line
 from utank_hil.canbus import ControlWord, DriveState, Frame
 from utank_hil.canbus.frame import STANDARD
-from utank_hil.canbus.profiles.device import hear
+from utank_hil.canbus.profiles.device import CalledTaker, hear
 from utank_hil.configuration.device_sections import DriveSection
 from utank_hil.control.pressure_loop import PressureLoop
 from utank_hil.dynamics.pump_curve import pump_pressure
@@ -357,7 +357,7 @@ def test_who_hears_it_takes_its_frames_and_watches_both_its_messages():
     assert heard.watched == line.drive.watched
     assert routing.watched == ("another", *line.drive.watched)
     assert heard.slow == (0x285 | STANDARD,)
-    assert heard.words == line.drive.words == "node 5: status word 0x0000"
+    assert heard.words == line.drive.words == "node 5: is being configured"
     nobody = DriveHeard(SimpleNamespace(takers={}, watched=()), None, pump=False, canopen=None)
     assert (nobody.watched, nobody.slow, nobody.native, nobody.words) == ((), (), False, "")
 
@@ -441,6 +441,35 @@ def test_its_words_are_its_status_and_a_mode_that_it_was_not_put_in():
     line.run(4)
     assert line.drive.words == "node 5: status word 0x0250, mode 3 and not 4"
     assert line.reports[-1][1].refused
+
+
+def test_a_drive_that_does_not_answer_and_one_on_its_way_are_said_to_be_so():
+    line, no_answer = (
+        Line(),
+        "node 5: 1000h:0 can't be read .*no answer in time.*: look at its supp",
+    )
+    takes = line.drive.takers[STANDARD | 0x585]
+    line.drive.takers[STANDARD | 0x585] = CalledTaker(lambda *_: None)
+    assert re.match(no_answer, line.run(100).drive.words)
+    assert {report for _, report in line.reports} <= {None}
+    line.drive.takers[STANDARD | 0x585] = takes
+    line.wire.said.append((0x705, b"\0"))  # boot-up
+    assert line.run(4).drive.words == "node 5: is being configured"
+    assert line.run(400).drive.words == "node 5: status word 0x0250"
+
+
+def test_an_answer_that_is_lost_on_the_way_does_not_speak_against_the_device():
+    line, seen = Line(), []
+    takes = line.drive.takers[STANDARD | 0x585]
+
+    def loses(frame, now_ns):
+        seen.append(frame)
+        if len(seen) % 3:
+            takes.take(frame, now_ns)
+
+    line.drive.takers[STANDARD | 0x585] = CalledTaker(loses)
+    said = line.run(60).drive.words
+    assert re.match("node 5: 1018h:. can't be read .*: look at .*what loses or delays frames", said)
 
 
 def test_an_emergency_while_it_is_configured_is_in_its_words_until_it_is_started():

@@ -125,12 +125,15 @@ class CanopenDrive:
     @property
     def words(self) -> str:
         """What is wrong with the drive, by its own words."""
-        if self.setup.problem:
-            return self.setup.problem
-        said = f"node {self._plan.node}: status word {self._status:#06x}"
+        setup = self.setup
+        if setup.problem or (setup.unanswered and not setup.emergency.words):
+            return setup.problem or setup.unanswered
+        known = setup.done or self._hears_only
+        told = f"status word {self._status:#06x}" if known else "is being configured"
+        said = f"node {self._plan.node}: {told}"
         if self._mode_shown != self._plan.mode.number:
             said += f", mode {self._mode_shown} and not {self._plan.mode.number}"
-        emergency = self.setup.emergency.words
+        emergency = setup.emergency.words
         return f"{said}, {emergency}" if emergency else said
 
     def frames(self, now_ns: int) -> list[Frame]:

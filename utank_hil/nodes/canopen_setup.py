@@ -16,6 +16,10 @@ ANSWER_NS: Final = 300_000_000  #: CiA 301 names no time; servers of drives answ
 PATIENCE_NS: Final = 300_000_000  #: For a mode to be entered, likewise.
 AGAIN_NS: Final = 2_000_000_000  #: From a refusal, or from silence, to the next try.
 
+_UNANSWERED: Final = (
+    "look at its supply, wiring, bit rate and node number, and for what loses or delays frames"
+)
+
 _Talk = Generator[tuple[cia.Place, bytes], cia.Answer, None]
 
 
@@ -50,7 +54,7 @@ class CanopenSetup:
     def __init__(self, bus: int, node: int, steps: Iterable[cia.Step]) -> None:
         self._node, self._steps = node, tuple(steps)
         self._tag = bus << BUS_SHIFT | STANDARD
-        self.problem = ""
+        self.problem = self.unanswered = ""
         self.emergency = Emergency(bus, node)
         self.takers: dict[int, Taker] = {
             self._tag | cia.SDO_ANSWER + node: CalledTaker(self._take_answer),
@@ -98,6 +102,7 @@ class CanopenSetup:
         got = cia.answer(frame.data)
         asked = self._request if self._asked_ns is not None else None
         if got is not None and asked is not None and got.place == asked[0]:
+            self.unanswered = ""
             self._advance(got)
 
     def _advance(self, got: cia.Answer) -> None:
@@ -115,7 +120,9 @@ class CanopenSetup:
         for number, step in enumerate(self._steps):
             got = yield step.place, cia.read_request(step.place)
             if not number and got.abort == cia.Abort.NO_ANSWER_IN_TIME:
-                raise _Refused  # nobody is there: its silence says so
+                # it is silent, and nothing is known against it
+                self.unanswered = self._words(step, got) + f": {_UNANSWERED}"
+                raise _Refused
             said = ""
             first_ns = self._now_ns
             while not step.writes and not self._kept(step, got):
@@ -133,7 +140,9 @@ class CanopenSetup:
             there = got.abort != cia.Abort.NO_OBJECT
             unread = not step.equal_bits and got.value is None and there
             if step.needed and not unread and not self._kept(step, got):
-                raise _Refused(self._words(step, got) + said + f": {step.remedy}")
+                lost = got.abort == cia.Abort.NO_ANSWER_IN_TIME
+                remedy = _UNANSWERED if lost else step.remedy
+                raise _Refused(self._words(step, got) + said + f": {remedy}")
 
     @staticmethod
     def _kept(step: cia.Step, got: cia.Answer) -> bool:
@@ -174,7 +183,8 @@ class SensorSetup:
     @property
     def words(self) -> str:
         """What is wrong with the sensor, by its own words; else empty."""
-        return self.setup.problem or self.setup.emergency.node_words
+        setup = self.setup
+        return setup.problem or setup.emergency.node_words or setup.unanswered
 
     def frames(self, now_ns: int) -> list[Frame]:
         """What the configuration needs in this tick, usually nothing."""

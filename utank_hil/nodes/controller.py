@@ -267,7 +267,7 @@ class ControllerNode:
             self.telemetry.renew_slow()
             accepted = self.inbox.stations.take_accepted()
             for event in safety.update_alarms(accepted, now_ns, self.inbox.errors):
-                received = self.inbox.received(event.code)
+                received = self.inbox.received(event.code, safety.messages(event.code))
                 self.telemetry.tell(replace(event, received=received), self.start_ns)
             frames.append(self._alarm_frames.frame(safety.alarms.next_message(now_ns)))
             frames.append(self._status.frame(self._status_message(measured, judgement)))

@@ -276,14 +276,16 @@ class Inbox:
         self._link_lost_until_ns = now_ns + period_ns
         self._received[Fault.BUS_LOST] = reason
 
-    def received(self, code: Fault) -> str:
-        """Node, message and value that a fault was last judged by, in words."""
+    def received(self, code: Fault, heard: Sequence[Heard] = ()) -> str:
+        """Node, message and value that a fault was last judged by, in words.
+
+        `heard` are messages of which the monitors have found something.
+        """
         if code in _OF_DRIVE:
             return self._drive.words
         if code is Fault.DEVICE_ERROR:
             return "; ".join(self._routing.errors)
         source, parts = self._sources.get(code), [self._received.get(code, "")]
-        heard: Sequence[Heard] = ()
         if code is Fault.MOTION_SILENT:
             source = min(self.motions, key=lambda sensor: sensor.heard_ns).receiver
         elif code is Fault.OPERATOR_SILENT:

@@ -12,7 +12,7 @@ from utank_hil.safety import judging
 from utank_hil.safety.alarms import AlarmList, Gravity, active_faults, stopping_faults
 from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.monitors.senders import BusLoad
+from utank_hil.safety.monitors.senders import BusLoad, Heard
 from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.safety.safety_limits import SafetyLimits
 from utank_hil.safety.situation import MILLISECOND_NS, Judgement, OwnState, Situation
@@ -34,6 +34,11 @@ QUIET_START_NS: Final = 10_000_000_000
 """What is awaited at the start is an alarm only when it has not come by then."""
 _TEN: Final = 10
 
+_OF_PACE: Final = {
+    Fault.FOREIGN_SENDER: Finding.SECOND_SENDER,
+    Fault.NODE_SILENT: Finding.NODE_SILENT,
+    Fault.BUS_DEGRADED: Finding.FRAMES_LOST,
+}
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _INIT: Final = Mode.INIT
 _ACTIVE: Final = Mode.ACTIVE
@@ -216,6 +221,11 @@ class Safety:
             self.alarms.raise_anew(supervisor.raised, mode, now_ns)
         if self._start_ns is None:
             self._start_ns = now_ns
+
+    def messages(self, code: Fault) -> list[Heard]:
+        """The messages by whose pace a fault was judged."""
+        finding = _OF_PACE.get(code, 0)
+        return [] if self.monitors is None else self.monitors.senders.of(finding)
 
     def update_alarms(
         self, accepted: list[int | None], now_ns: int, errors: Collection[str] = ()

@@ -120,7 +120,7 @@ class Monitors:
         self.used = 0  #: Place of the motion sensor in use.
         self._pair = MotionPair(thresholds, SHORT_S)
         self._frames_per_s = bit_rate / MEAN_FRAME_BITS
-        self._senders = Senders((), self._frames_per_s)
+        self.senders = Senders((), self._frames_per_s)
         self._phase = 0
         self._last_ns = self._motion_ns = self._senders_ns = 0
         self._round_ns = self._looked_ns = 0
@@ -170,7 +170,7 @@ class Monitors:
             Stream(receiver, silent_s=SILENT_S if receiver.can_id in expected else math.inf)
             for receiver in receivers
         ]
-        self._senders = Senders(streams, self._frames_per_s)
+        self.senders = Senders(streams, self._frames_per_s)
 
     def twin_message(self) -> PassiveTwinMessage:
         """What the panels are shown of the twin: degraded by what degrades the motion sensor."""
@@ -214,7 +214,7 @@ class Monitors:
         self._judges_from_ns = now_ns + BACKLOG_NS
         self._last_ns = self._motion_ns = self._senders_ns = now_ns - TICK_NS
         self._round_ns = self._looked_ns = now_ns - TICK_NS
-        self._senders.begin(measured.foreign)
+        self.senders.begin(measured.foreign)
 
     def _look_at_motion(self, measured: Measurements, own: OwnState) -> int:  # noqa: ARG002
         now_ns, motions = measured.now_ns, measured.motions
@@ -332,7 +332,7 @@ class Monitors:
     def _look_at_bus(self, measured: Measurements, own: OwnState) -> int:
         elapsed_s = (measured.now_ns - self._senders_ns) * 1e-9
         self._senders_ns = measured.now_ns
-        found = self._senders.update(measured.foreign, elapsed_s)
+        found = self.senders.update(measured.foreign, elapsed_s)
         found |= self._saturation.update(
             own.command_pa, drive_limited=measured.drive_held_back, elapsed_s=LONG_S
         )

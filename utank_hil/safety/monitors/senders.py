@@ -75,7 +75,8 @@ class Stream:
     """
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
-        self._receiver = receiver
+        self.receiver: Final = receiver
+        self.found = 0  #: What was found in the last update.
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
         self.begin()
@@ -86,7 +87,7 @@ class Stream:
 
     def begin(self) -> None:
         """Judge nothing of what was received until now."""
-        receiver = self._receiver
+        receiver = self.receiver
         self._heard, self._lost = receiver.heard, receiver.lost
         self._damaged = receiver.rejected[_CRC]
         self._proofs = receiver.rejected[_PROOF]
@@ -95,7 +96,7 @@ class Stream:
 
     def update(self, elapsed_s: float) -> int:
         """Judge what came since the last call; return what was found."""
-        receiver = self._receiver
+        receiver = self.receiver
         heard = receiver.heard - self._heard
         lost = receiver.lost - self._lost
         came = heard + lost
@@ -128,11 +129,14 @@ class Stream:
         if receiver.rejected[_PROOF] != self._proofs:
             self._proofs = receiver.rejected[_PROOF]
             found |= Finding.WRONG_PROOF
-        return found | Finding.NODE_SILENT if self._silent_s > self._silent_limit_s else found
+        if self._silent_s > self._silent_limit_s:
+            found |= Finding.NODE_SILENT
+        self.found = found
+        return found
 
     def _on_change(self, elapsed_s: float) -> float:
         """Frames since the last call that may come on top of the cycle's."""
-        receiver = self._receiver
+        receiver = self.receiver
         rejected = sum(receiver.rejected.values())
         extra = (receiver.changes - self._changes) - (rejected - self._rejected)
         self._changes, self._rejected = receiver.changes, rejected
@@ -151,6 +155,11 @@ class Senders:
         self._excess = 0.0
         self._now_s = 0.0  # pragma: no mutate: differences of it count
         self._damaged_s = [-math.inf] * DAMAGED_FRAMES
+
+    def of(self, finding: int) -> list[Heard]:
+        """The messages of which this was found last."""
+        streams = (*self._due, *self._later)
+        return [each.receiver for each in streams if each.found & finding]
 
     def begin(self, foreign: int) -> None:
         """Judge nothing of what was received until now, nor of the foreign frames so far."""
