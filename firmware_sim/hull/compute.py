@@ -96,7 +96,8 @@ def compute_hull(
     data["center_of_mass"] = ("point", centre_m)
     data["rotation_center"] = ("point", np.zeros(3))
     found = hull_of_dataset(Path(name), data)
-    wrong = found.frequency_rad_s[np.max(energy_errors(found), axis=1) > _ENERGY_ERROR]
+    arm_m = -float(mesh.vertices[:, 2].min()) / 2  # of the water's pressure on the sides
+    wrong = found.frequency_rad_s[np.max(energy_errors(found, arm_m), axis=1) > _ENERGY_ERROR]
     if len(omega) - len(wrong) < 2:
         raise MeshError("radiates other energy than it takes from waves: is it a ship's hull?")
     data = data.sel(omega=[at for at in data["omega"].values if at not in wrong])
@@ -139,10 +140,11 @@ def write_hull(path: Path, data: Any) -> None:
         data.to_netcdf(path, engine="h5netcdf")
 
 
-def energy_errors(hull: HullData) -> FloatArray:
+def energy_errors(hull: HullData, arm_m: float = 0.0) -> FloatArray:
     """Return the relative error of Haskind's relation at each frequency, shape (n, 3).
 
-    The degrees are sway, heave and roll; the headings go from 0 to 180 degrees.
+    The degrees are sway, heave and roll; the headings go from 0 to 180 degrees. Where sides and
+    bottom cancel each other in roll, its error is that of the moment of sway's force at `arm_m`.
     """
     degrees = [1, 2, 3]
     force = np.abs(hull.excitation[..., degrees]) ** 2
@@ -150,7 +152,9 @@ def energy_errors(hull: HullData) -> FloatArray:
     omega = hull.wave_frequency_rad_s[:, None]
     taken = omega**3 * around / (4 * math.pi * hull.density_kg_m3 * hull.gravity_m_s2**3)
     given = hull.damping[:, degrees, degrees]
-    return np.asarray(np.abs(given - taken) / np.maximum(given, 0.02 * given.max(axis=0)))
+    scale = np.maximum(given, 0.02 * given.max(axis=0))
+    scale[:, 2] = np.maximum(scale[:, 2], given[:, 0] * arm_m**2)
+    return np.asarray(np.abs(given - taken) / scale)
 
 
 def _lid(side: Any) -> Any:

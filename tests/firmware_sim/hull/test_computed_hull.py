@@ -133,6 +133,14 @@ def test_energy_adds_up_and_a_frequency_at_which_it_does_not_is_named(monkeypatc
     assert len(found.frequency_rad_s) == 6 - len(said)
 
 
+def test_a_barge_whose_roll_hardly_radiates_keeps_the_waves_it_rolls_in() -> None:
+    side = cpt.Mesh(*box(60.0, 12.0, 3.5, panels=(20, 8, 5)))  # sides and bottom cancel in roll
+    omega = np.array([0.3, 0.75, 1.11, 1.6])
+    _, found, said = compute_hull(side, Loading(gm_m=1.5, roll_period_s=8.0), "barge", omega)
+    assert not said
+    assert found.frequency_rad_s == pytest.approx(omega)
+
+
 def test_file_holds_the_ship_with_the_period_that_was_asked_for(tmp_path: Path) -> None:
     side = cpt.Mesh(*wigley(panels=(16, 5)))
     data, hull, _ = compute_hull(side, Loading(gm_m=1.2, roll_period_s=7.5), "w", OMEGA)
