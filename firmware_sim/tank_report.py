@@ -86,9 +86,10 @@ def loading_table(loadings: Sequence[Loading]) -> Table:
     """Table of the roll at other loadings; marked where the law rolls the ship more."""
     title = "Other loadings: the same tank and law, roll RMS in °"
     figures = ("roll period", "without tank", "passive tank", "active tank")
-    table = new_table(title, *figures, names=())
+    count = 3 if all(each.expected.active_rad is None for each in loadings) else 4
+    table = new_table(title, *figures[:count], names=())
     for each in loadings:
-        cells = [_degrees(roll, "") for roll in rolls(each.expected)]
+        cells = [_degrees(roll, "") for roll in rolls(each.expected)][: count - 1]
         gain = each.expected.active_below_passive
         if gain is not None and gain.mean < 0:
             cells[-1] = f"* {cells[-1]}"

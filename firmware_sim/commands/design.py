@@ -20,7 +20,7 @@ from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.console import common
-from utank_hil.console.ship_report import order_words
+from utank_hil.console.ship_report import order_words, sized_words
 from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.optimal_tank import best_passive_tank, tank_figures
@@ -78,6 +78,7 @@ def tank(
             common.print_json(figures)
             return
         console.table(_table(loaded, tanks, {}))
+        _say_pump(console, loaded)
         console.say("Name a sea with --scenario for the roll to be expected.")
         return
     chosen, waves = sea_of(path, loaded, vessel)
@@ -109,8 +110,10 @@ def tank(
     console.table(_table(loaded, tanks, found, interval_words(found["present"][0], name)))
     if loaded.pump is not None and law is None:
         console.say("no self-tuned law has all margins with this tank", yellow="not active:")
-    if loaded.pump is not None:
-        console.say(f"pump: net head, flow, shaft, duty: {order_words(loaded)}")
+    elif chosen.controllers and not _self_tuned(chosen):
+        laws = ", ".join(chosen.controllers)
+        console.say(f"active: a self-tuned law for this sea; a bench has {laws}")
+    _say_pump(console, loaded)
     if loadings:
         console.table(loading_table(loadings))
     if sweep:
@@ -195,9 +198,7 @@ def _bench(
     scenario = scenario.model_copy(update={"vessel": vessel})
     if vessel.pump is None:
         return scenario, _plant(vessel), (None,)
-    own: list[ControllerConfig] = [
-        each for each in scenario.controllers.values() if isinstance(each.law, SelfTunedDesign)
-    ]
+    own = _self_tuned(scenario)
     content = {"name": "", "vessel": vessel, "law": {"kind": "self_tuned"}}
     config = own[0] if own else ControllerConfig.model_validate(content)
     design = config.law if own else SelfTunedDesign("self_tuned", expected_sea(vessel.ship, waves))
@@ -208,6 +209,18 @@ def _bench(
         if not isinstance(error.__cause__, NoLawError):
             raise
         return scenario, config.plant, (None,) * (1 + config.renews)
+
+
+def _say_pump(console: Terminal, vessel: Vessel) -> None:
+    order = "" if vessel.pump is None else order_words(vessel)
+    console.say(f"pump: net head, flow, shaft, duty: {order}" if order else sized_words(vessel))
+
+
+def _self_tuned(scenario: Scenario) -> list[ControllerConfig]:
+    from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+
+    laws = scenario.controllers.values()
+    return [each for each in laws if isinstance(each.law, SelfTunedDesign)]
 
 
 def _figures(vessel: Vessel, tank: Tank, found: "Sequence[Expected] | None") -> dict[str, Any]:
@@ -237,7 +250,8 @@ def _table(
         ]
         columns.append(rows + (roll_rows(found[name]) if found else []))
     for (text, present), (_, best) in zip(*columns, strict=True):
-        table.add_row(text, present, best)
+        if present or best:
+            table.add_row(text, present, best)
     return table
 
 

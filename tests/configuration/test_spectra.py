@@ -40,8 +40,9 @@ def test_a_sea_is_read_from_a_table_of_frequency_and_density(tmp_path):
     ("text", "said"),
     [
         ("f,s\n0.1,1\n", "needs the columns frequency_hz and density_m2_hz, has f, s"),
-        ("frequency_hz,density_m2_hz\n0.2,1\n0.1,1\n", "frequency_hz must be finite, positive"),
-        ("frequency_hz,density_m2_hz\n0.1,-1\n0.2,1\n", "density must be finite and zero"),
+        ("frequency_hz,density_m2_hz\n0.2,1\n0.1,1\n", "increasing, got 0.1 after 0.2: sort"),
+        ("frequency_hz,density_m2_hz\n0.1,-1\n0.2,1\n", "zero or more, got -1 at 0.1 Hz"),
+        ("frequency_hz,density_m2_hz\n0.6,0.2\n0.7,0.4\n", "0.4 at 0.7 Hz .* in rad/s are divided"),
         ("frequency_hz,density_m2_hz\n0.1,9e3\n0.2,9e3\n", "holds a sea of"),
         ("frequency_hz,density_m2_hz\n0.1,0\n0.2,0\n", "holds a sea of 0 m"),
         ("frequency_hz,density_m2_hz\n0.1,\n0.2,1\n", "density must be finite and zero"),

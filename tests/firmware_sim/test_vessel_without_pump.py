@@ -59,6 +59,26 @@ def test_check_shows_no_margins_of_no_law(tmp_path: Path) -> None:
     assert "Margins" not in done.stdout
 
 
+def test_design_names_the_pump_to_order_and_its_keys(tmp_path: Path) -> None:
+    scenario_file(tmp_path)
+    ship = tmp_path / "vessel.yaml"
+
+    def said(*words: str) -> list[str]:
+        done = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["design", "tank", str(ship), *words])
+        assert done.exit_code == 0, done.output
+        return done.stdout.splitlines()
+
+    scenario = "--scenario", str(tmp_path / "scenario.yaml"), "--out", str(tmp_path / "out")
+    lines = said(*scenario)
+    assert not any("active" in line for line in lines)  # no row or column of what is not there
+    (number,) = (at for at, line in enumerate(lines) if line.startswith("no pump;"))
+    order, keys = lines[number].split(": ")[-1], lines[number + 1].strip()
+    ship.write_text(ship.read_text() + keys + "\n")
+    (tmp_path / "scenario.yaml").unlink()
+    heads = [line for line in said() if line.startswith("pump: net head")]
+    assert heads == [f"pump: net head, flow, shaft, duty: {order}"]
+
+
 def test_plant_takes_no_command(tmp_path: Path) -> None:
     scenario = load_config(scenario_file(tmp_path), Scenario)
     vessel = scenario.vessel

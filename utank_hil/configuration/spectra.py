@@ -28,7 +28,7 @@ from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import MeasuredSpectra, Spectrum, ittc, jonswap, load_ndbc, pierson_moskowitz
 from utank_hil.sea.measured import SUFFIXES, load_directional
-from utank_hil.sea.ndbc import HIGHEST_M
+from utank_hil.sea.ndbc import HIGHEST_M, breaking
 
 WaveHeight = Annotated[float, Range(above=0, most=HIGHEST_M)]
 """Significant height in m; the greatest ever measured is 19 m."""
@@ -168,12 +168,18 @@ class TabulatedSpectrum(Section):
     @model_validator(mode="after")
     def _readable(self) -> Self:
         try:
-            height_m = self.spectrum().hs_m
+            spectrum = self.spectrum()
+            height_m = spectrum.hs_m
         except ValueError as error:
             refuse("sea", [("file", str(error))])
         if not 0 < height_m <= HIGHEST_M:
             reason = f"holds a sea of {height_m:.3g} m: is the density in m2/Hz, of waves?"
             refuse("sea", [("file", reason)])
+        peak = [spectrum.density.argmax()]
+        reason = breaking(spectrum.frequency_hz[peak], spectrum.density[peak])
+        if reason:
+            refuse("sea", [("file", f"{reason}: frequencies in rad/s are divided by 2 pi, and "
+                            "their densities multiplied by it")])  # fmt: skip
         return self
 
     def spectrum(self) -> Spectrum:

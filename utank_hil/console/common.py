@@ -72,8 +72,8 @@ def _named(bus: str) -> str:
 
 Bus = Annotated[str, option("CAN interface, for example can0.", "--bus", callback=_named)]
 Run = Annotated[str | None, option("Run of a recording; without it the last one.")]
-From = Annotated[float | None, typer.Option("--from", metavar="SECONDS")]
-To = Annotated[float | None, typer.Option("--to", metavar="SECONDS")]
+From = Annotated[float | None, option("By the record's times.", "--from", metavar="SECONDS")]
+To = Annotated[float | None, option("By the record's times.", "--to", metavar="SECONDS")]
 Channel = Annotated[
     str | None, option("Bus to read of a log with several, as it says.", metavar="NAME")
 ]

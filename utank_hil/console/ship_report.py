@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m
+from utank_hil.analysis.tank_sizing import pump_demand, pump_level_m, size_pump
 from utank_hil.canbus.profiles.guarded import guard_parts
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.device_section import DeviceSection
@@ -213,6 +213,16 @@ def order_words(vessel: Vessel) -> str:
         f"{figures['pump_head_m']:.2f} m, {three_digits(figures['pump_flow_m3_s'])} m³/s, "
         f"{power_words(figures['pump_power_w'])}, reversing"
     )
+
+
+def sized_words(vessel: Vessel) -> str:
+    """Return the words and the keys of the pump that `init` sizes for a tank without one."""
+    demand = pump_demand(vessel.ship, vessel.tank, pump_level_m(vessel.ship, vessel.tank))
+    pump = size_pump(vessel.tank, demand)
+    most = f"{float(f'{pump.max_pressure_pa:.4g}'):.0f}", f"{float(f'{pump.max_power_w:.4g}'):.0f}"
+    order = order_words(vessel.model_copy(update={"pump": pump}))
+    keys = "pump: {{max_pressure_pa: {}, max_power_w: {}}}".format(*most)
+    return f"no pump; `init` sizes for this tank: {order}\n  {keys}"
 
 
 def power_words(power_w: float) -> str:

@@ -55,7 +55,7 @@ def draw_campaign(
             left.set(xlabel=axis, ylabel=rolled)
             left.set_ylim(bottom=0)
         else:
-            shown = [str(group) for group in groups[:MOST_GROUPS]]
+            shown = [str(group) for group in groups[:MOST_GROUPS] if group != ""]
             left.set_yticks(-np.arange(len(shown)) - 0.4, shown)
             left.set_xlabel(rolled)
         ordinate = "Share of the cases above it"

@@ -161,14 +161,18 @@ def _no_density(line: DataLine, values: FloatArray) -> str:
     height_m = Spectrum(frequency, density).hs_m
     if height_m > HIGHEST_M:
         return f"waves of {height_m:.3g} m are higher than any sea's: is it a file of densities?"
-    saturated = TAIL * GRAVITY_M_S2**2 / (2 * np.pi) ** 4 / frequency**5
-    wrong = (frequency >= TAIL_HZ) & (density > saturated)
-    if wrong.any():
-        return (
-            f"density {density[wrong][-1]:g} at {frequency[wrong][-1]:g} Hz is more than waves of "
-            "this frequency can have without breaking: is it a file of densities?"
-        )
-    return ""
+    reason = breaking(frequency, density)
+    return f"{reason}: is it a file of densities?" if reason else ""
+
+
+def breaking(frequency_hz: FloatArray, density: FloatArray) -> str:
+    """Say which density waves can't have without breaking; empty if they can have all."""
+    saturated = TAIL * GRAVITY_M_S2**2 / (2 * np.pi) ** 4 / frequency_hz**5
+    wrong = (frequency_hz >= TAIL_HZ) & (density > saturated)
+    if not wrong.any():
+        return ""
+    which = f"density {density[wrong][-1]:g} at {frequency_hz[wrong][-1]:g} Hz"
+    return f"{which} is more than waves of this frequency can have without breaking"
 
 
 def _no_direction(values: FloatArray) -> str:

@@ -107,12 +107,16 @@ class Spectrum:
                 "spectrum needs two or more frequencies and as many densities, got shapes "
                 f"{frequency.shape} and {density.shape}"
             )
-        if not (
-            np.isfinite(frequency).all() and frequency[0] > 0 and np.all(np.diff(frequency) > 0)
-        ):
-            raise ValueError("spectrum frequency_hz must be finite, positive and increasing")
-        if not (np.isfinite(density).all() and np.all(density >= 0)):
-            raise ValueError("spectrum density must be finite and zero or more")
+        before = np.concatenate([[0.0], frequency[:-1]])
+        wrong = ~(np.isfinite(frequency) & (frequency > before))
+        if wrong.any():
+            got = f"got {frequency[wrong][0]:g} after {before[wrong][0]:g}: sort, each once"
+            must = "spectrum frequency_hz must be finite, positive and increasing"
+            raise ValueError(f"{must}, {got}")
+        wrong = ~(np.isfinite(density) & (density >= 0))
+        if wrong.any():
+            got = f"got {density[wrong][0]:g} at {frequency[wrong][0]:g} Hz"
+            raise ValueError(f"spectrum density must be finite and zero or more, {got}")
         if self.direction_from_deg is not None and self.direction_from_deg.shape != frequency.shape:
             raise ValueError("spectrum direction_from_deg must have one value per frequency")
         if self.spread is not None and self.direction_from_deg is None:
