@@ -411,6 +411,12 @@ def test_what_is_encoded_of_a_shared_identifier_has_its_selector(tmp_path):
          "cycle_ms: is 30, and cycle_ms 10"),
         # of PAGE's eight bits: one that can't be, one with a sign, a mask with none of them
         ({"valid_when": [{"from": "a.PAGE", "mask": 3, "in": [0, 4]}]}, "in has 4, and the bits"),
+        # a signal that is another thing, too
+        ({"signals": {"roll_rad": {"from": "b.TURN"}, "roll_rate_rad_s": {"from": "b.TURN"}}},
+         "roll_rate_rad_s: b.TURN is that of signals.roll_rad, too: name its own"),
+        ({"protection": {"counters": ["a.ANGLE"]}},
+         "roll_rad: a.ANGLE is that of protection.counters, too"),
+        ({"signals": {"roll_rad": {"from": "a.ANGLE", "sign": 0}}}, "must be one of 1, -1 .got 0"),
         ({"valid_when": [{"from": "a.PAGE", "in": [-1]}]}, "in has -1, and .* without sign"),
         ({"valid_when": [{"from": "a.PAGE", "mask": 0x300, "in": [0]}]}, "0x300 has none of the"),
         ({**STATE, "valid_when": [{"from": "s.OF", "in": ["valid"]}]},

@@ -241,7 +241,13 @@ class DeviceSection(CanopenSection):
 
     def _signal_problems(self, kind: type[tuple[Any, ...]]) -> Iterator[Problem]:
         known = FIELDS[kind]
+        counted = dict.fromkeys(self.protection.counters, "protection.counters")
         for name, signal in self.signals.items():
+            if kind in (SensorMotion, SensorTank) and signal.source == "measured":
+                if signal.from_ in counted and name not in SWITCHES:
+                    reason = f"{signal.from_} is that of {counted[signal.from_]}, too: name its own"
+                    yield f"signals.{name}", reason
+                counted[signal.from_] = f"signals.{name}"
             if name not in known:
                 yield f"signals.{name}", f"is no value of it; there are {', '.join(known)}"
                 continue

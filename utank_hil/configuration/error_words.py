@@ -165,7 +165,7 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
 
 def _one_of(context: Any, key: str, written: Any) -> str:
     """Return the choices of an error, and the probably intended one."""
-    choices = re.findall(r"'([^' ]*)'", context[key])
+    choices = re.findall(r"'([^' ]*)'", context[key]) or re.findall(r"-?\d+", context[key])
     near = nearest(str(written).lower(), choices)
     return f"one of {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
 
