@@ -70,7 +70,7 @@ class StarterShip:
         parameters.refuse("ship", problems or self._shape_problems())
 
     def _shape_problems(self) -> list[parameters.Problem]:
-        """Implausible combinations for the beam: displacement and length, period and GM."""
+        """Implausible combinations for the beam: displacement and length, GM, period and GM."""
         if self.beam_m >= self.length_m:
             reason = f"is {self.beam_m:g} m, and the length {self.length_m:g} m: swap the two"
             return [("beam_m", reason)]
@@ -90,6 +90,10 @@ class StarterShip:
                 "beam and displacement; ships have 0.35 to 0.9: it is in metres"
             )
             return [("draught_m", reason)]
+        most_m = (self.draught_m or math.inf) + self.beam_m**2 / (12 * depth_m)  # KB and BM
+        if self.gm_m > most_m:
+            reason = f"is {self.gm_m:g} m, and the metacentre {most_m:.3g} m above the keel at most"
+            return [("gm_m", f"{reason}: it is in metres")]
         gyration_m = self.period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * self.gm_m)
         least, most = _GYRATION_PER_BEAM
         if least <= gyration_m / self.beam_m <= most:

@@ -71,6 +71,8 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
     # a ship from its papers
     ("a GM in centimetres", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm 110 "
      "--roll-period 10", ("gm", "metres")),
+    ("a GM in centimetres, the period by formula", "init {here}/a --length 90 --beam 14 "
+     "--displacement 2800 --gm 110 --draught 4", ("--gm", "the metacentre 11.3 m above", "metres")),
     ("no stability", "init {here}/a --length 90 --beam 14 --displacement 2800 --gm -1", ("gm",)),
     ("neither draught nor period", f"init {{here}}/a {' '.join(SHIP)}",
      ("roll-period", "draught")),
