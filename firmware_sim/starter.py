@@ -20,7 +20,7 @@ from utank_hil.configuration.ship_keys import WrittenShip, weather_criterion_per
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.roll_damping import HullForm, estimated_roll_damping
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.retuning.estimator import LEAST_PERIODS, EstimateSettings
+from utank_hil.retuning.estimator import SHIP_PERIODS, EstimateSettings
 
 USUAL_DAMPING_RATIO: Final = 0.05
 """Damping ratio of a ship that nothing is known of. Chosen; no study."""
@@ -344,13 +344,13 @@ def controller_file(
     slope = number(sea["effective_slope"]["coefficient"])
     level = f"level_m: {number(limits['level_m'])}, " if limits else ""
     remark = "# level_m: beyond it the water in the duct would be too fast\n" if limits else ""
-    least_s = math.ceil(LEAST_PERIODS * roll_period_s)
+    least_s = math.ceil(SHIP_PERIODS * roll_period_s)
     record = f"record_s: {least_s}, " if least_s > EstimateSettings().record_s else ""
     return f"""\
 # A law that finds its numbers for ship and pump, with all margins. It begins with no waves in
 # particular, and the tank's loss in those of the section sea. Ship and waves are estimated from the
-# motion, and the law is renewed for them, after ten minutes or so. mean_power_w in W, beside sea,
-# bounds what the pump spends.
+# motion, and the law is renewed for them, first after fifteen roll periods. mean_power_w in W,
+# beside sea, bounds what the pump spends.
 name: {json.dumps(f"{name}, self-tuned")}
 vessel: ship.yaml
 law:

@@ -12,7 +12,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.retuning import EstimateSettings, renewal
+from utank_hil.retuning import EstimateSettings
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
@@ -33,11 +33,7 @@ def job_of(duration_s: float, scenario: Scenario = SCENARIO) -> Job:
 
 
 @pytest.mark.evidence
-def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # three minutes: what is tried here is the exchange, not the estimate
-    monkeypatch.setattr(renewal, "LEAST_PERIODS", 14.0)
+def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(tmp_path: Path) -> None:
     job = job_of(240.0)
     file = tmp_path / "renewed.frames"
     logged = run_lockstep(replace(job, frames=file))

@@ -12,7 +12,7 @@ from utank_hil.analysis.tank_sizing import TankRoom
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.retuning.estimator import LEAST_PERIODS, EstimateSettings
+from utank_hil.retuning.estimator import SHIP_PERIODS, EstimateSettings
 from utank_hil.retuning.renewing import FIRST_EFFORT
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
@@ -80,4 +80,4 @@ def test_the_record_of_a_slow_ship_is_long_enough_to_tell_the_ship(roll_period_s
     sea = starter_sea(300, roll_period_s)
     content = yaml.safe_load(controller_file("slow", roll_period_s, sea, {}))["sea_estimate"]
     assert ("record_s" in content) == written
-    assert EstimateSettings(**content).record_s >= LEAST_PERIODS * roll_period_s
+    assert EstimateSettings(**content).record_s >= SHIP_PERIODS * roll_period_s

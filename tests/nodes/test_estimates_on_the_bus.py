@@ -21,6 +21,7 @@ from utank_hil.retuning import (
     Refusal,
     RetuningEvent,
     ShipFigures,
+    estimator,
 )
 from utank_hil.retuning.adaptive import AdaptiveController
 from utank_hil.runners import Lockstep
@@ -31,6 +32,11 @@ OMEGA = np.linspace(0.2, 2.0, 50)
 WAVES = SlopeSpectrum(OMEGA, 1e-3 * np.exp(-OMEGA))
 SHIP = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
 FOUND = MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP, WAVES, 0.05, 3.2, 9.1, 1200.0)
+
+
+@pytest.fixture(autouse=True)
+def _the_first_estimate_after_half_a_minute(monkeypatch):
+    monkeypatch.setattr(estimator, "SEA_PERIODS", 1.38)
 
 
 @dataclass

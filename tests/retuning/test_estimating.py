@@ -14,6 +14,7 @@ from utank_hil.retuning.renewal import EstimateTask, estimate
 from utank_hil.sea import jonswap
 
 TASK = EstimateTask(PLANT, SAMPLE_TIME_S, 0.5)
+PERIOD_S = 2 * np.pi / SHIP.natural_frequency_rad_s
 MOMENT_NM = wave_moment_nm(jonswap(4.0, 10.0), 1300.0, seed=3)
 
 
@@ -76,6 +77,20 @@ def test_with_a_passive_tank_and_another_ship_than_the_known_one_the_sea_is_unce
     assert (found.of_sea, found.of_ship) == (Verdict.UNCERTAIN, Verdict.UNCERTAIN)
 
 
+def test_fifteen_rolls_tell_the_waves_but_no_ship():
+    """The ship is another, and what its motion seems to tell of it must not count yet."""
+    motion, ship = motion_in(MOMENT_NM), loaded(14.4)
+    short = motion[500 : 500 + round(15 * PERIOD_S / SAMPLE_TIME_S)]
+    found = estimate(request(short), TASK)
+    assert (found.of_sea, found.of_ship) == (Verdict.GOOD, Verdict.RECORD_SHORT)
+    assert found.ship.roll_period_s == pytest.approx(PERIOD_S, rel=0.02)
+    whole = estimate(request(motion[500:]), TASK)
+    assert found.waves.rms_rad == pytest.approx(whole.waves.rms_rad, rel=0.3)
+    other = motion_in(MOMENT_NM, ship)[500 : 500 + len(short)]
+    assert estimate(request(other), TASK).of_ship is Verdict.RECORD_SHORT
+    assert estimate(request(motion[500 : 400 + len(short)]), TASK).waves is None
+
+
 def test_righting_levers_are_those_of_the_known_ship():
     """Straight levers say no more than the stiffness does."""
     ship = loaded(10.0)
@@ -106,7 +121,7 @@ def test_lost_samples_are_no_harm_and_many_are_a_short_record():
     ("motion", "verdict"),
     [
         (np.full((6000, 3), np.nan), Verdict.RECORD_SHORT),
-        (motion_in(MOMENT_NM)[:2000], Verdict.RECORD_SHORT),
+        (motion_in(MOMENT_NM)[:800], Verdict.RECORD_SHORT),
         (np.zeros((6000, 3)), Verdict.MOTION_SMALL),
         (
             np.random.default_rng(1).standard_normal((3200, 3)) * [2e-4, 5e-4, 3.5e-3],

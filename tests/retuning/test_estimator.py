@@ -18,7 +18,7 @@ WAVES = SlopeSpectrum(OMEGA, np.exp(-OMEGA))
 GOOD = MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP, WAVES, 0.05, 3.2, 9.1, 1200.0)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
 WEIGHT_N = 1e8
-CONFIGURED = RollShip(2e9, 1e9, 5e7, displacement_n=WEIGHT_N)
+CONFIGURED = RollShip(4.05e8, 1e9, 5e7, displacement_n=WEIGHT_N)  # 15 rolls in a minute
 SETTINGS = EstimateSettings(every_s=60.0, record_s=300.0)
 
 
@@ -51,7 +51,7 @@ def test_it_asks_once_an_interval_for_the_latest_record_and_shows_what_came():
     first, last = motion.desk.records[0], motion.desk.records[-1]
     assert first.record.shape == (301, 3)
     assert last.record.shape == (1500, 3)
-    assert first.ship == ShipFigures(1e9, 2e9, 5e7)
+    assert first.ship == ShipFigures(1e9, 4.05e8, 5e7)
     assert first.record[-1].tolist() == pytest.approx([6.0, 0.2, 0.3])
     figures = motion.estimator.figures
     assert (figures.sea.verdict, figures.ship.verdict) == (Verdict.GOOD, Verdict.GOOD)

@@ -22,7 +22,7 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
-from utank_hil.retuning.estimator import LEAST_PERIODS, EstimateSettings
+from utank_hil.retuning.estimator import SHIP_PERIODS, EstimateSettings
 from utank_hil.retuning.settings import RetuningSettings, record_problems
 from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.safety.monitors.thresholds import SensorFigures
@@ -257,11 +257,11 @@ class ControllerConfig(Section):
         return [(f"retuning.{name}", reason) for name, reason in problems]
 
     def _record_problems(self) -> list[Problem]:
-        least_s = LEAST_PERIODS * 2 * math.pi / self.vessel.ship.natural_frequency_rad_s
+        least_s = SHIP_PERIODS * 2 * math.pi / self.vessel.ship.natural_frequency_rad_s
         if self.sea_estimate is None or self.sea_estimate.record_s >= least_s:
             return []
         reason = (
-            f"must be {LEAST_PERIODS:g} of the ship's roll periods, {math.ceil(least_s)}, or more: "
+            f"must be {SHIP_PERIODS:g} of the ship's roll periods, {math.ceil(least_s)}, or more: "
             f"{self.sea_estimate.record_s:g} never tell sea and ship"
         )
         return [("sea_estimate.record_s", reason)]

@@ -1,7 +1,7 @@
 """Estimator in the loop: keeps the motion record and requests estimates from it.
 
-Every `every_s` the record goes to the retuner's process (`estimating`). The ship is not excited,
-and the loop does not wait.
+As soon as it tells the waves, and then every `every_s`, the record goes to the retuner's process
+(`estimating`). The ship is not excited, and the loop does not wait.
 """
 
 import math
@@ -23,7 +23,10 @@ COLUMNS: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Columns of the motion record."""
 SAMPLE_TIME_S: Final = 0.2
 """Sample time of the record; its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
-LEAST_PERIODS: Final = 45.0  #: Shortest record in natural roll periods.
+SEA_PERIODS: Final = 14.0
+"""Shortest record of the waves in natural roll periods: 8 gave no better laws (retuning.md)."""
+SHIP_PERIODS: Final = 45.0
+"""Shortest record of the ship in its roll periods: 20 left 11 % in the period (retuning.md)."""
 LONGEST_RECORD_S: Final = 3600.0  #: Longest record: a sea counts as stationary for one hour.
 OUTDATED: Final = 3.0  #: Number of intervals after which an estimate is outdated: two may fail.
 SHIP_OUTDATED_S: Final = 3600.0
@@ -127,6 +130,8 @@ class Estimator:
     ) -> None:
         self._settings = settings
         self._every_ns = round(settings.every_s * 1e9)
+        # a roll more, in which the sensors come
+        self._first_ns = round((SEA_PERIODS + 1) * 2e9 * math.pi / ship.natural_frequency_rad_s)
         self._outdated_ns = round(OUTDATED * settings.every_s * 1e9)
         self._ship_outdated_s = max(SHIP_OUTDATED_S, OUTDATED * settings.every_s)
         self._desk = desk
@@ -156,8 +161,8 @@ class Estimator:
         self._motion[:] = motion
         self._history.add(0.0, self._motion, fresh=fresh)  # whatever the pump does
         if self._due_ns is None:
-            self._due_ns = now_ns + self._every_ns
-            self._since_ns = now_ns
+            self._due_ns = now_ns + self._first_ns
+            self._since_ns = max(now_ns, self._due_ns - self._every_ns)
         came = None
         if self._asked_ns is not None:
             came = self._look(self._asked_ns, now_ns)

@@ -15,7 +15,7 @@ from utank_hil.control import DesignPlant
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, SPREAD, MotionFit, fit_motion
 from utank_hil.retuning.answer import Refusal, RenewedLaw
 from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
-from utank_hil.retuning.estimator import LEAST_PERIODS
+from utank_hil.retuning.estimator import SEA_PERIODS, SHIP_PERIODS
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
@@ -120,13 +120,14 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     """Estimate waves and ship from a record.
 
     The ship is fitted to the whole record and to its last half. If they contradict each other, the
-    loading changed meanwhile and the half counts. If the motion does not identify the ship, the
-    waves are based on the known one, and uncertain if another ship explains the motion far better.
+    loading changed meanwhile and the half counts. If the motion does not identify the ship, or the
+    record is too short for that, the waves are based on the known one, and uncertain if another
+    ship explains the motion far better.
     """
-    period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
-    least = round(LEAST_PERIODS * period_s / task.sample_time_s)
+    period = 2 * np.pi / task.plant.ship.natural_frequency_rad_s / task.sample_time_s
+    least = round(SHIP_PERIODS * period)
     motion = _without_gaps(request.record)
-    if motion is None or len(motion) < least:
+    if motion is None or len(motion) < round(SEA_PERIODS * period):
         return MotionEstimate(Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
     if not np.ptp(motion, axis=0).all():
         return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
@@ -137,6 +138,8 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
         if _identified(late, task) and (_apart(late, fit) or not _identified(fit, task)):
             fit, motion = late, half
     of_ship = Verdict.GOOD if _identified(fit, task) else Verdict.UNCERTAIN
+    if len(motion) < least:
+        of_ship = Verdict.RECORD_SHORT
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
