@@ -24,9 +24,9 @@ SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
 def job_of(duration_s: float, scenario: Scenario = SCENARIO) -> Job:
-    """The shipped configuration, which estimates more often and from a shorter record."""
+    """The shipped configuration, which estimates more often."""
     config = load_config(Path("configs/controllers/self_tuning.yaml"), ControllerConfig)
-    often = EstimateSettings(every_s=30.0, record_s=300.0, renew=True)
+    often = EstimateSettings(every_s=30.0, renew=True)
     config = config.model_copy(update={"sea_estimate": often})
     scenario = scenario.model_copy(update={"controllers": {"renewed": config}})
     return jobs_of(scenario, scenario.seed, duration_s)[1]
@@ -56,12 +56,13 @@ def test_a_peak_of_the_waves_is_not_taken_for_a_ship_of_twice_the_stiffness() ->
     scenario = scenario.model_copy(update={"sea": sea.model_copy(update={"effective_slope": mild})})
     jobs = jobs_of(scenario, scenario.seed, 640.0)
     passive, law = (run_lockstep(jobs[k]) for k in (0, -1))
-    assert law.retuning[1].state is TRIAL
-    assert "roll period 10.70 s" in law.retuning[1].reasons[0]
-    tried = law.between(law.retuning[1].time_ns * 1e-9 + 10.0, 640.0)
+    trials = [event for event in law.retuning if event.state is TRIAL]
+    assert len(trials) == 3  # the last one by a record that could tell a ship
+    assert all("roll period 10.70 s" in event.reasons[0] for event in trials)
+    tried = law.between(trials[0].time_ns * 1e-9 + 10.0, 640.0)  # 43 rolls
     assert set(law.column("mode")[tried]) == {Mode.ACTIVE}
     roll, without = (run.column("true_roll_rad")[tried].std() for run in (law, passive))
-    assert roll < 0.7 * without
+    assert roll < 0.8 * without
 
 
 @pytest.mark.evidence
