@@ -81,16 +81,16 @@ def test_a_device_by_its_profile_is_expected_like_a_node():
 
 
 def test_contents_of_one_identifier_and_a_status_that_is_not_valid_are_named():
-    page = {"start": 0, "bits": 8}
+    page, count = {"start": 0, "bits": 8}, {"bits": 16, "signed": True}
     pages = {
         name: {"id": 0x18FF5A21, "format": "29bit", "only": {"from": "PAGE", "in": [number]},
-               "signals": {"PAGE": page, "A": {"start": 8, "bits": 16, "signed": True}}}
+               "signals": {"PAGE": page, "A": {"start": 8, **count}, "B": {"start": 24, **count}}}
         for name, number in (("values", 1), ("state", 2))
     }  # fmt: skip
-    value = {"from": "values.A", "scale": 1e-4}
+    roll, rate = ({"from": f"values.{name}", "scale": 1e-4} for name in "AB")
     theirs = {
         "profile": "", "messages": pages, "cycle_ms": 20, "age_ms": 60, "accept_unprotected": True,
-        "signals": {"roll_rad": value, "roll_rate_rad_s": value},
+        "signals": {"roll_rad": roll, "roll_rate_rad_s": rate},
         "protection": {"unchanged_ms": 2000},
         "valid_when": [{"from": "state.A", "mask": 3, "in": [3]}],
     }  # fmt: skip
