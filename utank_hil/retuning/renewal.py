@@ -94,6 +94,9 @@ nothing is identified with an inertia that the prior excludes (`SAME`).
 """
 SEA_DEVIATION: Final = 0.2
 """Largest relative deviation of the moment's root mean square for a sea that counts as known."""
+SHORT_DEVIATION: Final = 0.5
+"""Least relative deviation of that from a record too short for a ship: its bands are wide, and the
+moment in swell of 18 s came out 45 % too great after 15 rolls, 27 % after 22 (docs/retuning.md)."""
 CONTRADICTED: Final = 20.0
 """Log-likelihood ratio from which another ship contradicts the known one."""
 LONGEST_S: Final = 25.0
@@ -125,7 +128,7 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     ship explains the motion far better.
     """
     period = 2 * np.pi / task.plant.ship.natural_frequency_rad_s / task.sample_time_s
-    least = round(SHIP_PERIODS * period)
+    of_a_ship = round(SHIP_PERIODS * period)
     motion = _without_gaps(request.record)
     if motion is None or len(motion) < round(SEA_PERIODS * period):
         return MotionEstimate(Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
@@ -133,13 +136,13 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
         return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
     fit = fit_motion(motion, task.plant, task.sample_time_s)
     half = motion[len(motion) // 2 :]
-    if len(half) >= least:
+    if len(half) >= of_a_ship:
         late = fit_motion(half, task.plant, task.sample_time_s)
         if _identified(late, task) and (_apart(late, fit) or not _identified(fit, task)):
             fit, motion = late, half
+    short = len(motion) < of_a_ship
     of_ship = Verdict.GOOD if _identified(fit, task) else Verdict.UNCERTAIN
-    if len(motion) < least:
-        of_ship = Verdict.RECORD_SHORT
+    of_ship = Verdict.RECORD_SHORT if short else of_ship
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
@@ -152,7 +155,8 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     elevation = waves.elevation_density(task.effective_slope)
     longer = float(elevation[waves.omega_rad_s < 2 * np.pi / LONGEST_S].sum())
     beam = longer <= MOST_LONGER * float(elevation.sum())
-    sea_known = fit.rms_deviation <= SEA_DEVIATION and not contradicted
+    rms_deviation = max(fit.rms_deviation, SHORT_DEVIATION if short else 0.0)
+    sea_known = rms_deviation <= SEA_DEVIATION and not contradicted
     return MotionEstimate(
         Verdict.GOOD if sea_known else Verdict.UNCERTAIN,
         of_ship,
@@ -164,7 +168,7 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
             fit.period_deviation,
         ),
         waves,
-        fit.rms_deviation,
+        rms_deviation,
         waves.hs_m(task.effective_slope) if beam else math.nan,
         2 * np.pi / float(waves.omega_rad_s[np.argmax(elevation)]) if beam else math.nan,
         len(motion) * task.sample_time_s,
