@@ -240,7 +240,7 @@ def test_the_water_has_to_obey_before_it_counts_as_watched():
     still = Table()
     moved(still, MovingShip(0.0, 0.0, noise=False), 100.0)
     assert not still.monitors.confirmed
-    moved(still, ROLLING, 40.0)  # so sudden a motion looks late at first
+    moved(still, ROLLING, 50.0)  # so sudden a motion looks late at first
     assert still.monitors.confirmed
     moved(still, Fading(still.now_ns * 1e-9), 300.0)
     assert still.monitors.confirmed  # water at rest is watched, too

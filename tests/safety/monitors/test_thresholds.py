@@ -49,6 +49,7 @@ def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors():
         "least_pump_push_m2_s2": 4e3 / 1025.0,
         "gauge_push_m2_s2": 2 * G * 0.003 / math.sqrt(2),
         "zero_push_m2_s2": G * 20.0 * math.radians(0.3),
+        "steady_push_m2_s2": 20.0 * (G * math.radians(0.3) + 0.05 * G),
         "motion_late_s": 1 / 3,
         "pressure_error_pa": 6e3,
         "free_rotor_pa_m": 0.2 * 1025.0 * G,

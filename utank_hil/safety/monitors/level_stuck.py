@@ -3,7 +3,9 @@
 While the measured level stays within a band, the water is computed from where it began, at rest, by
 the tank's equation. Water that does move may cross the band to its turning point and back; in that
 time the computed level moves four bands, and some more by the noise. Sixteen are a level that is
-stuck, if they are as many with every sway that the ship may have.
+stuck, if they are as many with every sway that the ship may have and with every constant push, of
+a turn and of the sensors' zeros, that would have held it still until then. A level that repeats
+itself to the last digit for as long as a live gauge does not needs no such push to be excluded.
 """
 
 import math
@@ -13,6 +15,7 @@ from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.motion import DEAD_PERIODS, DEAD_S
 from utank_hil.safety.monitors.noise import Noise
 from utank_hil.safety.monitors.sway import most_sway
 from utank_hil.safety.monitors.tank_equation import roll_push_at_natural_frequency
@@ -71,8 +74,12 @@ class LevelStuck:
         self._mean_rad = 0.0
         self._density = tank.density_kg_m3
         self._most_sway = most_sway(ship)
+        self._steady = thresholds.steady_push_m2_s2
         self._band_m = thresholds.level_still_m
         self._period_s = period_s
+        self._dead_samples = math.ceil(
+            max(DEAD_PERIODS * thresholds.tank_period_s, DEAD_S) / period_s
+        )
         self._inertia = tank.effective_length_m
         self._loss = tank.loss_pa_per_m_s / tank.density_kg_m3
         self.restart()
@@ -80,11 +87,14 @@ class LevelStuck:
     def restart(self) -> None:
         """Begin anew after a gap."""
         self._begin(math.inf)
+        self._last_m, self._repeated = math.inf, 0
 
     def _begin(self, level_m: float) -> None:
         self._level_m = level_m
         self._moved_m = self._rate_m_s = 0.0
         self._swayed_m = self._sway_rate_m_s = 0.0
+        self._steady_m = self._steady_rate_m_s = 0.0
+        self._least, self._most = -self._steady, self._steady
 
     def update(
         self, roll_rad: float, level_m: float, pressure_pa: float, slope_push_m2_s2: float
@@ -96,6 +106,8 @@ class LevelStuck:
         """
         # A steady heel pushes otherwise than a roll does.
         self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
+        self._repeated = self._repeated + 1 if level_m == self._last_m else 0
+        self._last_m = level_m
         if abs(level_m - self._level_m) > self._band_m:
             self._begin(level_m)
             return 0
@@ -110,8 +122,17 @@ class LevelStuck:
         pushed = slope_push_m2_s2 - self._loss * rate_m_s - 2 * GRAVITY_M_S2 * swayed_m
         self._sway_rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
         self._swayed_m = swayed_m = swayed_m + rate_m_s * self._period_s
+        # what a constant push of 1 adds
+        steady_m, rate_m_s = self._steady_m, self._steady_rate_m_s
+        pushed = 1.0 - self._loss * rate_m_s - 2 * GRAVITY_M_S2 * steady_m
+        self._steady_rate_m_s = rate_m_s = rate_m_s + pushed / self._inertia * self._period_s
+        self._steady_m = steady_m = steady_m + rate_m_s * self._period_s
+        # the constant pushes with which it has not moved further than this
         other_m, most_m = moved_m - self._most_sway * swayed_m, BANDS * self._band_m
-        # pragma: no mutate start: it is never just that
-        stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
-        # pragma: no mutate end
+        self._least = max(self._least, (-most_m - max(moved_m, other_m)) / steady_m)
+        self._most = min(self._most, (most_m - min(moved_m, other_m)) / steady_m)
+        if self._repeated > self._dead_samples:
+            stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
+        else:
+            stuck = self._least > self._most
         return Finding.LEVEL_STUCK if stuck else 0

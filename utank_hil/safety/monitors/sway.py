@@ -71,18 +71,19 @@ class Misfit:
     """Squares of e + k u - z, with the share k of sway and the zero z that leave the least of them.
 
     e is what a case does not explain of the water's motion, u what a sway of g times the slope
-    takes from the water in that case. The sums fade. `share` is the last one found.
+    takes from the water in that case. The sums fade: `u` is that of u, `uu` of its squares. `share`
+    is the last one found.
     """
 
-    __slots__ = ("_e", "_ee", "_eu", "_u", "share", "uu", "weight")
+    __slots__ = ("_e", "_ee", "_eu", "share", "u", "uu", "weight")
 
     def __init__(self) -> None:
-        self._e = self._u = self._ee = self._eu = self.share = self.uu = self.weight = 0.0
+        self._e = self._ee = self._eu = self.share = self.u = self.uu = self.weight = 0.0
 
     def add(self, e: float, u: float, keep: float) -> None:
         """Fade by `keep`, then add a sample."""
         self._e = keep * self._e + e
-        self._u = keep * self._u + u
+        self.u = keep * self.u + u
         self._ee = keep * self._ee + e * e
         self._eu = keep * self._eu + e * u
         self.uu = keep * self.uu + u * u
@@ -90,7 +91,7 @@ class Misfit:
 
     def least(self, most_share: float, most_zero: float) -> float:
         """Return the least sum for a share from 0 to `most_share` and a zero up to `most_zero`."""
-        e, u, eu, uu, weight = self._e, self._u, self._eu, self.uu, self.weight
+        e, u, eu, uu, weight = self._e, self.u, self._eu, self.uu, self.weight
         # pragma: no mutate start: u has no mean, so that they hardly depend on one another
         share = zero = 0.0
         for _ in range(2):

@@ -19,15 +19,18 @@ and the sway does not. Sums with a memory of 0.4 roll periods tell what each of 
     roll late        y - p - x+ + k u      x+ a quarter of the tank's period ahead of x
 
 with the k, and the constant within +-z, that leave the least: no sensor's zero is quite right, and
-a commissioning lets z pass. A sign is wrong if the sound case leaves far more of the push in
-question than another one does. For water that answers a push with the gain g, that is g below
-`SIGN_GAIN`. So one k and one z have to explain all of the last half period, in phase with the
+none measures the acceleration in a turn. A sign is wrong if the sound case leaves far more of the
+push in question than another one does. For water that answers a push with the gain g, that is g
+below `SIGN_GAIN`. So one k and one z have to explain all of the last half period, in phase with the
 slope: reversed signs would take a negative one, or one that changes with the frequency.
 
-The level's gain, sum(y (p + x)) / sum((p + x) (p + x)), is 0 if the level is stuck. What leads
-y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods. Both hold for
-every k. Where the roll has not moved for a quarter of a period, what the sound case leaves tells
-that it should have.
+The level's gain, that of y's deviation from its mean on that of p + x, is 0 if the level is stuck.
+What leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods. Both
+hold for every k. Where the roll has not moved for a quarter of a period, what the sound case leaves
+tells that it should have.
+
+A turn that builds up is no constant, and heels the ship meanwhile. So delays and a roll that does
+not move are judged by `Unsteady` signals, with the sensors' zeros alone.
 
 The ship's inertia, stiffness and load stand in u alone. A case is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
@@ -76,8 +79,11 @@ CREST_PERIODS: Final = 0.1
 MEMORY_PERIODS: Final = 0.4
 BAND_MEMORY_PERIODS: Final = 0.44
 LATE_PERIODS: Final = 1.5
-LATE_PUSHES: Final = 1.75
-"""Of the least push: with less, noise looked like a delay in healthy hours of calm sea."""
+MEAN: Final = 0.5
+"""Over w0: both poles of `Unsteady`. Of a push that grows to 1 within T, 0.15 are left at most."""
+LATE_PUSHES: Final = 3.0
+"""Of the least push. With 1.75, noise looked like a delay in healthy hours of calm sea, and with
+2.2 a turn in still water did."""
 LEAST_SHARE: Final = 0.06
 """Of one push beside the other one."""
 VALVE_SHARE: Final = 0.2
@@ -115,6 +121,32 @@ class Band:
             bend = each.update(signal)
             found.append(each.value + share * bend)
         self.begun = True
+        return found
+
+
+class Unsteady:
+    """What some signals have beside a mean, twice, scaled to as much as they have at w0."""
+
+    def __init__(self, frequency_rad_s: float, period_s: float, count: int) -> None:
+        self._share = 1 - exp(-MEAN * frequency_rad_s * period_s)
+        self._scale = 1 + MEAN * MEAN
+        self._first: list[float] = []
+        self._second = [0.0] * count
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._first.clear()
+
+    def update(self, signals: list[float]) -> list[float]:
+        """Take the next sample of each; the first one is a mean."""
+        first, second, share, found = self._first, self._second, self._share, []
+        if not first:
+            first[:], second[:] = signals, [0.0] * len(signals)
+        for place, signal in enumerate(signals):
+            first[place] += share * (signal - first[place])
+            beside = signal - first[place]
+            second[place] += share * (beside - second[place])
+            found.append(self._scale * (beside - second[place]))
         return found
 
 
@@ -175,6 +207,8 @@ class TankEquation:
         self._settle = math.ceil(settled / (2 * frequency_rad_s * period_s))
         self._band_wait = math.ceil((settled - SETTLED) / (2 * frequency_rad_s * period_s))
         self._keep = exp(-period_s / (memory * thresholds.tank_period_s))
+        self._unsteady = Unsteady(frequency_rad_s, period_s, 4)
+        self._once, self._twice = (Unsteady(frequency_rad_s, period_s, 3) for _ in range(2))
         self._late_keep = exp(-period_s / (LATE_PERIODS * thresholds.tank_period_s))
         # sums of so many squares of the least push
         samples = memory * thresholds.tank_period_s / period_s
@@ -185,7 +219,7 @@ class TankEquation:
         late_share = LATE_PUSHES * roll * frequency_rad_s
         self._least_dd = late_share * late_share / (1 - self._late_keep)
         self._filled = FILLED / (1 - self._keep)
-        self._zero = thresholds.zero_push_m2_s2
+        self._steady, self._zero = thresholds.steady_push_m2_s2, thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
         self._level_still_m = thresholds.level_still_m
         self._crest_samples = round(CREST_PERIODS * thresholds.tank_period_s / period_s)
@@ -203,15 +237,18 @@ class TankEquation:
         if self._band is not None:
             self._band.begun = False
         self.obeyed = self.water_moves = False
-        self._sound, self._reversed, self._swapped, self._pump_reversed, self._quarter_late = (
-            Misfit() for _ in range(5)
+        self._sound, self._reversed, self._swapped, self._pump_reversed = (
+            Misfit() for _ in range(4)
         )
+        self._sound_unsteady, self._quarter_late = Misfit(), Misfit()
         # pragma: no mutate start: one more is little beside hundreds of samples
-        self._xx = self._pp = self._vv = self._both = 0.0
-        self._level_both = self._push_sum = self._slope_both = 0.0
+        self._xx = self._xx_unsteady = self._pp = self._vv = self._both = 0.0
+        self._level_both = self._level_sum = self._push_sum = self._slope_both = 0.0
         self._slope_lead = self._late_uu = 0.0
         # pragma: no mutate end
         self._slope.restart()
+        for each in (self._unsteady, self._once, self._twice):
+            each.restart()
         self.slope_push = 0.0
         self._forget_lead()
         self._still = self._level_still = 0
@@ -225,7 +262,7 @@ class TankEquation:
 
     def _forget_lead(self) -> None:
         """Begin anew with what leads the roll."""
-        self._lead = self._d = self._dd = 0.0
+        self._lead = self._dd = 0.0
         self._samples = 0
 
     def update(
@@ -291,11 +328,11 @@ class TankEquation:
         if self._wait > 0:
             self._wait -= 1
             return 0
+        lead, rate, slope = self._twice.update(self._once.update([lead, rate, self.slope_push]))
         self._lead = self._late_keep * self._lead + lead * rate
-        self._d = self._late_keep * self._d + rate
         self._dd = self._late_keep * self._dd + rate * rate
-        self._slope_lead = self._late_keep * self._slope_lead + self.slope_push * rate
-        self._late_uu = self._late_keep * self._late_uu + self.slope_push * self.slope_push
+        self._slope_lead = self._late_keep * self._slope_lead + slope * rate
+        self._late_uu = self._late_keep * self._late_uu + slope * slope
         push, u = p + x, of_roll + of_level
         if abs(level_m) > self._most_m:
             self.restart()  # what is not seen now is not known
@@ -310,9 +347,13 @@ class TankEquation:
         self._vv = keep * self._vv + held * held
         self._both = keep * self._both + push * push
         self._level_both = keep * self._level_both + y * push
+        self._level_sum = keep * self._level_sum + y
         self._push_sum = keep * self._push_sum + push
         self._slope_both = keep * self._slope_both + u * push
+        left, x, d, u = self._unsteady.update([left, x, d, u])
+        self._sound_unsteady.add(left, u, keep)
         self._quarter_late.add(left + x - d / self._w0, u, keep)
+        self._xx_unsteady = keep * self._xx_unsteady + x * x
         self._samples += 1
         self._level_still += 1
         if abs(level_m - self._level_m) > self._level_still_m:
@@ -330,24 +371,27 @@ class TankEquation:
         self.doubt = self.level_gain = self.late_s = math.nan
         if self._sound.weight < self._filled:
             return 0
-        zero, most_sway, xx, pp, both = self._zero, self._most_sway, self._xx, self._pp, self._both
-        sound = self._sound.least(most_sway, zero)
+        most_sway, xx, pp, both = self._most_sway, self._xx, self._pp, self._both
+        steady, zero, late_xx = self._steady, self._zero, self._xx_unsteady
+        sound = self._sound.least(most_sway, steady)
+        unsteady = self._sound_unsteady.least(most_sway, zero)
         self._of_sway = self._spread + self._spread_of_share * self._sound.share
         spread = self._of_sway * math.sqrt(self._sound.uu)
         held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
         enough_x = xx > self._least_xx and xx > held
-        steady = self._samples > self._late_samples
+        whole = self._samples > self._late_samples
+        enough_late = whole and late_xx > self._least_xx and late_xx > held
         enough_p = pp > self._least_pp and pp > self._pump_share * xx
         enough_both = both > self._least_xx + self._least_pp
         cases = (
-            (self._reversed, xx, enough_x, Finding.WATER_SIGN),
-            (self._pump_reversed, pp, enough_p, Finding.PUMP_SIGN),
-            (self._swapped, both, enough_both, Finding.WATER_SIGN),
-            (self._quarter_late, xx, enough_x and steady, Finding.MOTION_LATE),
+            (self._reversed, steady, sound, xx, enough_x, Finding.WATER_SIGN),
+            (self._pump_reversed, steady, sound, pp, enough_p, Finding.PUMP_SIGN),
+            (self._swapped, steady, sound, both, enough_both, Finding.WATER_SIGN),
+            (self._quarter_late, zero, unsteady, late_xx, enough_late, Finding.MOTION_LATE),
         )
         judged = [
-            (case.least(most_sway, zero), power, case.uu, finding)
-            for case, power, enough, finding in cases
+            (case.least(most_sway, most_zero), left, power, case.uu, finding)
+            for case, most_zero, left, power, enough, finding in cases
             if enough
         ]
         moves = self._level_still <= self._crest_samples
@@ -355,28 +399,31 @@ class TankEquation:
         if self._band is not None:  # a part of a wave tells less: as an average of as many samples
             filled = math.sqrt(self._sound.weight * (1 - self._keep))
         best = min([other for other, *_ in judged], default=0.0)
-        for other, power, uu, finding in sorted(judged, reverse=True):
+        for other, left, power, uu, finding in sorted(judged, reverse=True):
             least_uu = most_uu if self._band is None else min(uu, most_uu)
-            doubt = filled * self._excess(sound, other, power, least_uu)
+            doubt = filled * self._excess(left, other, power, least_uu)
             clearly = 1.0 if finding == Finding.MOTION_LATE else self._clearly
             if moves and doubt > 1 and other <= clearly * best:
                 found = found & Finding.MOTION_LATE | finding  # of two signs that which leaves less
             self.doubt = max(doubt, self.doubt)  # of NaN it is the first one
             if finding == Finding.WATER_SIGN and self._excess(other, sound, power, uu) > 1:
                 self.obeyed = True
-        if enough_both:
-            feigned = zero * abs(self._push_sum) + spread * math.sqrt(both)
-            feigned += max(most_sway * self._slope_both, 0.0)
-            self.level_gain = gain = (self._level_both + feigned) / both
+        mean = self._push_sum / self._sound.weight
+        both -= mean * self._push_sum
+        if both > self._least_xx + self._least_pp:
+            slope_both = self._slope_both - mean * self._sound.u
+            feigned = spread * math.sqrt(both) + max(most_sway * slope_both, 0.0)
+            level_both = self._level_both - mean * self._level_sum
+            self.level_gain = gain = (level_both + feigned) / both
             if gain < STUCK_GAIN and not found & Finding.WATER_SIGN:
                 found |= Finding.LEVEL_STUCK
         if self._still > self._still_samples:
             most = self._most_unmoved / math.sqrt(1 - self._keep) + spread
-            if sound > most * most:
+            if unsteady > most * most:
                 found |= Finding.ROLL_STUCK
         dd = self._dd
-        if dd > self._least_dd and steady:
-            feigned = zero * abs(self._d) + self._spread * math.sqrt(self._late_uu * dd)
+        if dd > self._least_dd and whole:
+            feigned = self._spread * math.sqrt(self._late_uu * dd)
             feigned -= min(most_sway * self._slope_lead, 0.0)
             self.late_s = late_s = (self._lead - feigned) / dd
             if late_s > self._late_limit_s:

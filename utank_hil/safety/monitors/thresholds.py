@@ -31,6 +31,9 @@ ROLL_PUSH_AT_W0: Final = 0.6
 g L phi at w0: the least of the shipped tanks, the naval vessel's (Patti-B's has 0.93)."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
+TURN_G: Final = 0.05
+"""Acceleration to the side in the hardest turn over g, which no sensor measures: V^2 / (g R) of a
+ship at a Froude number of 0.4 who keeps 0.7 of her speed in a circle of 1.5 lengths' radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,7 @@ class MonitorThresholds:
     least_pump_push_m2_s2: float
     gauge_push_m2_s2: float  #: Push that would hold the level off by the noise of a sample.
     zero_push_m2_s2: float  #: Constant push that the sensors' zeros may feign, all together.
+    steady_push_m2_s2: float  #: Constant push by these zeros and a hard turn.
     motion_late_s: float  #: Delay of the motion sensor.
     pressure_error_pa: float  #: Error of the pump's pressure against the model of the drive.
     free_rotor_pa_m: float  #: Pressure of a pump that is off, per level, that is excused besides.
@@ -127,6 +131,7 @@ def thresholds_of(
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
         gauge_push_m2_s2=math.sqrt(2) * GRAVITY_M_S2 * sensors.level_noise_m,  # mean of two
         zero_push_m2_s2=GRAVITY_M_S2 * tank.width_m * math.radians(ZERO_HEEL_DEG),
+        steady_push_m2_s2=GRAVITY_M_S2 * tank.width_m * (math.radians(ZERO_HEEL_DEG) + TURN_G),
         motion_late_s=0.2 / frequency_rad_s,
         pressure_error_pa=0.15 * limits.pressure_pa,
         # its inertia is some 7 % of the water's, which 2 rho g accelerates per level
