@@ -20,6 +20,12 @@ SPACING_S: Final = 0.25
 """Time from a frame's first point to its second."""
 BEAT_NS: Final = 1_000_000_000
 """Silence of its heartbeat, or of a station of the right versions, after which none counts."""
+REPLAY_NS: Final = 20_000_000_000
+AGAIN: Final = 3
+LEAST_RAD: Final = 0.01
+"""A forecast of at least so much that comes again so often within 20 s, to the last digit, is
+replayed: of live waves it does once in 30 years (digits of 1e-4 rad, 5 frames of a lead a second).
+"""
 
 
 class ForecastHeard:
@@ -39,7 +45,9 @@ class ForecastHeard:
     ) -> None:
         self._versions, self._received = versions, received
         self._points: dict[float, tuple[int, ForecastPoints]] = {}
-        self._matched_ns = NEVER_HEARD_NS
+        self._matched_ns = self._sought_ns = NEVER_HEARD_NS
+        self._sought: ForecastPoints | None = None
+        self._again, self._replayed = 0, False
         self.heard_ns = NEVER_HEARD_NS  #: When points that count came last.
         self.points: tuple[tuple[int, ForecastPoints], ...] = ()
         forecast = catalogue.receiver(ForecastPoints)
@@ -63,10 +71,20 @@ class ForecastHeard:
     def _take(self, points: ForecastPoints, now_ns: int) -> None:
         if points.quality not in USABLE or now_ns - self._matched_ns > BEAT_NS:
             return
-        if math.isfinite(sum(points[:4])):
+        if math.isfinite(sum(points[:4])) and not self._is_replayed(points, now_ns):
             self._points[points.lead_s] = now_ns, points
             self.points = tuple(self._points.values())
             self.heard_ns = now_ns
+
+    def _is_replayed(self, points: ForecastPoints, now_ns: int) -> bool:
+        """Whether one frame in 20 s, which is sought, comes again and again."""
+        if points == self._sought:
+            self._again += 1
+            self._replayed = self._replayed or self._again >= AGAIN
+        elif now_ns - self._sought_ns > REPLAY_NS and abs(points.moment_rad) > LEAST_RAD:
+            self._replayed = self._again >= AGAIN
+            self._sought, self._sought_ns, self._again = points, now_ns, 0
+        return self._replayed
 
 
 def forecast_of(measured: Measurements, most_age_ms: float) -> WaveForecast | None:
