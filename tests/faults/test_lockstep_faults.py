@@ -46,10 +46,11 @@ def armed_bench(**options):
 
 def rate_limit_holds(bench):
     """Every step between two commands is a permitted one for its time, or ends at zero."""
+    rate_pa_s = bench.config.limits.rate_pa_s
     return all(
         after.pressure_pa == 0.0
         or abs(after.pressure_pa - before.pressure_pa)
-        <= LIMITS.rate_pa_s * (later - earlier + WIRE) / SECOND + 8.0
+        <= rate_pa_s * (later - earlier + WIRE) / SECOND + 8.0
         for (earlier, before), (later, after) in pairwise(bench.heard.commands)
     )
 

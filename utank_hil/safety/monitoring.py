@@ -301,7 +301,8 @@ class Monitors:
                 self._level_found = self._level_stuck.update(
                     motion.roll_rad, level_m, pressure_pa, slope_push
                 )
-        if self._water_found or self.watches[self.used].found & Finding.DRIFT_LASTS:
+        suspect = self.equation.suspect  # a turn may be the reason
+        if suspect or self._water_found or self.watches[self.used].found & Finding.DRIFT_LASTS:
             self._wrong_ns = now_ns
             self.confirmed = False
         elif self.equation.obeyed and now_ns - self._wrong_ns > self._doubted_ns:

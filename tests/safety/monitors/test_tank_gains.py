@@ -286,7 +286,7 @@ def test_a_level_that_stands_at_a_crest_has_a_sign_for_a_tenth_of_a_period():
     assert not any(told[round(stands) + 2 :])
 
 
-def test_without_the_band_a_sign_counts_in_full_before_the_memory_is_full():
+def test_a_sign_counts_by_half_of_a_memory_that_is_full_by_a_quarter():
     """A gain of -1 leaves (1 + 1)^2 of the push's square, of which the model may leave 1 / 2^2."""
     equation, k = TankEquation(SHIP, TANK, EXACT, STEP_S), 0
     roll_rad, answer = 3.0 / PUSH, -3.0 / ANSWER
@@ -294,4 +294,4 @@ def test_without_the_band_a_sign_counts_in_full_before_the_memory_is_full():
         turn = cmath.exp(1j * W * k * STEP_S)
         equation.update((roll_rad * turn).real, (answer * turn).real, 0.0)
         k += 1
-    assert equation.doubt == pytest.approx(16, rel=0.05)
+    assert equation.doubt == pytest.approx(16 * math.sqrt(0.25), rel=0.05)

@@ -157,8 +157,9 @@ class TankEquation:
     over that at which a sign is found wrong. `level_gain`, see the module, and `late_s`, the motion
     sensor's delay, are with the constant within +-z and the sway that speak most for sound sensors.
     All three are NaN as long as the push, or the roll, is too small to tell. `obeyed` says whether
-    reversed motion or swapped gauges now leave far more than sound sensors do, `water_moves`
-    whether the level moves as one that swings by more than its noise at w0.
+    reversed motion or swapped gauges now leave far more than sound sensors do, `suspect` whether
+    they leave far less, if the ship does not turn. `water_moves` says whether the level moves as
+    one that swings by more than its noise at w0.
     """
 
     def __init__(
@@ -236,7 +237,7 @@ class TankEquation:
         self._wait = -1  # pragma: no mutate: below zero
         if self._band is not None:
             self._band.begun = False
-        self.obeyed = self.water_moves = False
+        self.obeyed = self.suspect = self.water_moves = False
         self._sound, self._reversed, self._swapped, self._pump_reversed = (
             Misfit() for _ in range(4)
         )
@@ -367,7 +368,7 @@ class TankEquation:
 
     def _judge(self) -> int:
         found = 0
-        self.obeyed = False
+        self.obeyed = self.suspect = False
         self.doubt = self.level_gain = self.late_s = math.nan
         if self._sound.weight < self._filled:
             return 0
@@ -395,9 +396,9 @@ class TankEquation:
             if enough
         ]
         moves = self._level_still <= self._crest_samples
-        filled, most_uu = 1.0, self._sound.uu
-        if self._band is not None:  # a part of a wave tells less: as an average of as many samples
-            filled = math.sqrt(self._sound.weight * (1 - self._keep))
+        most_uu = self._sound.uu
+        # a part of a wave tells less: as an average of as many samples
+        filled = math.sqrt(self._sound.weight * (1 - self._keep))
         best = min([other for other, *_ in judged], default=0.0)
         for other, left, power, uu, finding in sorted(judged, reverse=True):
             least_uu = most_uu if self._band is None else min(uu, most_uu)
@@ -406,8 +407,13 @@ class TankEquation:
             if moves and doubt > 1 and other <= clearly * best:
                 found = found & Finding.MOTION_LATE | finding  # of two signs that which leaves less
             self.doubt = max(doubt, self.doubt)  # of NaN it is the first one
-            if finding == Finding.WATER_SIGN and self._excess(other, sound, power, uu) > 1:
-                self.obeyed = True
+        # with a turn allowed for, a part of a wave looks like one of the other sign
+        straight = self._sound.least(most_sway, zero)
+        for case, _, _, power, enough, finding in cases:
+            if enough and finding == Finding.WATER_SIGN:
+                other = case.least(most_sway, zero)
+                self.obeyed = self.obeyed or self._excess(other, straight, power, case.uu) > 1
+                self.suspect = self.suspect or self._excess(straight, other, power, most_uu) > 1
         mean = self._push_sum / self._sound.weight
         both -= mean * self._push_sum
         if both > self._least_xx + self._least_pp:
