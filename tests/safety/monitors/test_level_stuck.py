@@ -99,6 +99,19 @@ def test_no_constant_push_may_explain_it(steady_push_m2_s2, swing_pa, pressure_p
         assert found_s[0] == pytest.approx(times_s[np.argmin(held)], abs=0.05)
 
 
+@pytest.mark.parametrize("period_s", [3.0, 10.0])
+def test_water_without_loss_is_held_by_a_turn_for_as_long_as_it_takes(period_s):
+    """After a whole swing it is where it began, whatever pushed it."""
+    height_m = G * (period_s / (2 * math.pi)) ** 2 - TUBE.width_m / 2
+    tube = replace(
+        TUBE, height_m=max(height_m, 0.2), width_m=min(TUBE.width_m, 4.0), damping_ratio=0.0,
+        duct_area_m2=TUBE.reservoir_area_m2,
+    )  # fmt: skip
+    stuck = LevelStuck(SHIP, tube, replace(THRESHOLDS, steady_push_m2_s2=50.0), 0.1)
+    found = [stuck.update(0.0, 1e-4 * (k % 2), 40e3, 0.0) for k in range(600)]
+    assert not any(found)
+
+
 def test_a_level_that_repeats_itself_is_stuck_though_a_turn_might_hold_the_water():
     """For a fifth of the period at least, and a second; what moves its last digit is alive."""
     alone_s = found_at_s(lambda _: 0.0, 0.0, 60e3, 20.0)

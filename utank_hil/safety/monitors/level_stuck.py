@@ -54,6 +54,8 @@ class Volume:
 
 
 BANDS: Final = 16.0  #: Movement of the water that counts, in bands. Chosen; no study.
+LEAST_STEADY_M: Final = 0.1 / (2 * GRAVITY_M_S2)
+"""A tenth of where a push of 1 leads: at the start, and after a swing without loss, it is none."""
 
 
 def way_until_found_m(level_noise_m: float) -> float:
@@ -129,8 +131,9 @@ class LevelStuck:
         self._steady_m = steady_m = steady_m + rate_m_s * self._period_s
         # the constant pushes with which it has not moved further than this
         other_m, most_m = moved_m - self._most_sway * swayed_m, BANDS * self._band_m
-        self._least = max(self._least, (-most_m - max(moved_m, other_m)) / steady_m)
-        self._most = min(self._most, (most_m - min(moved_m, other_m)) / steady_m)
+        if steady_m > LEAST_STEADY_M:
+            self._least = max(self._least, (-most_m - max(moved_m, other_m)) / steady_m)
+            self._most = min(self._most, (most_m - min(moved_m, other_m)) / steady_m)
         if self._repeated > self._dead_samples:
             stuck = min(moved_m, other_m) > most_m or max(moved_m, other_m) < -most_m
         else:
