@@ -19,7 +19,9 @@ The derivation, and deviations from the print, are in docs/control.md.
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
 
 from utank_hil.base.elementary import exp, tanh
 from utank_hil.base.ordered_sums import product
@@ -28,17 +30,24 @@ from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 
 
 class DirectFuzzyLaw(FuzzyLaw):
-    """Law that adapts its own gains."""
+    """Law that adapts its own gains; its rates and first values are numbers, or one of each."""
+
+    least_q: ClassVar[float]  #: Factor of Q above which the law's proof holds.
+    if TYPE_CHECKING:
+        adaptation: Any
+        leakage: Any
+        initial: Any
 
     @property
-    @abstractmethod
     def start(self) -> tuple[float, ...]:
         """Initial parameters, which the leakage returns to."""
+        return tuple(np.atleast_1d(self.initial).tolist())
 
     @property
-    @abstractmethod
     def rates(self) -> tuple[tuple[float, float], ...]:
         """Gamma and sigma of each parameter."""
+        each = (np.atleast_1d(of).tolist() for of in (self.adaptation, self.leakage))
+        return tuple(zip(*each, strict=True))
 
     @abstractmethod
     def answer(
@@ -50,30 +59,25 @@ class DirectFuzzyLaw(FuzzyLaw):
         """Return a new steppable controller."""
         return DirectFuzzyController(self)
 
-    def q_problems(self, above: float) -> list[Problem]:
-        """Find an eigenvalue that is too small for the proof of a law."""
-        q = self.error.q
-        return [] if q > above else [("error.q", f"must be above {above:g} for this law, got {q}")]
+    def _problems(self) -> list[Problem]:
+        """Find errors in the parameters, and an eigenvalue that is too small for the proof."""
+        problems, q = super()._problems(), self.error.q
+        if not q > self.least_q:
+            problems.append(("error.q", f"must be above {self.least_q:g} for this law, got {q}"))
+        return problems
 
 
 @dataclass(frozen=True, slots=True)
 class RobustFuzzy(DirectFuzzyLaw):
     """Law (4.23)-(4.24); q above 1."""
 
+    least_q: ClassVar[float] = 1.0
     gamma: Annotated[float, Range(above=0, below=1)]
     epsilon: Positive  #: Softness of the switching term.
     adaptation: tuple[Positive, Positive]  #: Gamma_1, Gamma_2.
     leakage: tuple[Positive, Positive]  #: sigma_1, sigma_2.
     initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)  #: lambda_0, theta_0, zero or more.
     kind: Literal["fuzzy_robust"] = "fuzzy_robust"
-
-    def _problems(self) -> list[Problem]:
-        return [*FuzzyLaw._problems(self), *self.q_problems(above=1)]
-
-    @property
-    def start(self) -> tuple[float, ...]:
-        """Initial parameters (lambda, theta), which the leakage returns to."""
-        return self.initial
 
     def answer(
         self, parameters: tuple[float, ...], s: float, square: float, psi: float
@@ -83,11 +87,6 @@ class RobustFuzzy(DirectFuzzyLaw):
         share = square / (2 * self.gamma * self.gamma)
         u = -gain * share * s - bound * psi * tanh(bound * psi * s / self.epsilon)
         return u, (share * s * s, psi * abs(s))
-
-    @property
-    def rates(self) -> tuple[tuple[float, float], ...]:
-        """Gamma and sigma of each parameter."""
-        return tuple(zip(self.adaptation, self.leakage, strict=True))
 
 
 class DirectFuzzyController(FuzzyController):

@@ -23,7 +23,7 @@ g is near one.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 class SmallGainFuzzy(DirectFuzzyLaw):
     """Law (4.20)-(4.22); q above 2."""
 
+    least_q: ClassVar[float] = 2.0
     gamma: Annotated[float, Range(above=0, below=1)]
     rho: Positive
     adaptation: Positive  #: Gamma.
@@ -46,25 +47,12 @@ class SmallGainFuzzy(DirectFuzzyLaw):
     initial: NotNegative = 0.0  #: lambda_0, zero or more.
     kind: Literal["fuzzy_small_gain"] = "fuzzy_small_gain"
 
-    def _problems(self) -> list[Problem]:
-        return [*FuzzyLaw._problems(self), *self.q_problems(above=2)]
-
-    @property
-    def start(self) -> tuple[float, ...]:
-        """Initial parameters (lambda,), which the leakage returns to."""
-        return (self.initial,)
-
     def answer(
         self, parameters: tuple[float, ...], s: float, square: float, psi: float
     ) -> tuple[float, tuple[float, ...]]:
         """Acceleration u, and the driving term of each parameter, without leakage."""
         theta = square / (4 * self.gamma * self.gamma) + psi * psi / (4 * self.rho * self.rho)
         return -parameters[0] * theta * s, (theta * s * s,)
-
-    @property
-    def rates(self) -> tuple[tuple[float, float], ...]:
-        """Gamma and sigma of each parameter."""
-        return ((self.adaptation, self.leakage),)
 
 
 @dataclass(frozen=True, slots=True)
