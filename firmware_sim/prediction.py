@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from firmware_sim.plant import Plant
-from firmware_sim.run import RECORD_NS, RECORD_S, roll_without_tank
+from firmware_sim.run import RECORD_S, roll_at_zero_pressure, roll_without_tank
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import plant_of
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, run_law, sensed_noise
@@ -221,7 +221,7 @@ def predict(
         return of_a_bench(1 - ratio * (1 + change))
 
     bare = rms(lambda seed: roll_without_tank(scenario, seed, count))
-    passive = rms(lambda seed: passive_run(scenario, seed, count))
+    passive = rms(lambda seed: roll_at_zero_pressure(plant_of(scenario, seed), count))
     found = Expected(
         window_s, of_a_bench(bare), of_a_bench(passive), passive_below_no_tank=below(passive, bare)
     )
@@ -274,16 +274,6 @@ def loaded(scenario: Scenario, scale: float) -> Scenario:
     if "stiffness_nm_rad" in actual:
         actual["stiffness_nm_rad"] /= scale * scale
     return scenario.model_copy(update={"vessel": vessel, "actual_ship": actual})
-
-
-def passive_run(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
-    """Roll with the pump at zero pressure every `RECORD_S`, shape (count,), and `capsized_s`."""
-    plant, roll = plant_of(scenario, seed), np.empty(count)
-    for row in range(count):
-        plant.drive_pump(0.0, enabled=True)
-        plant.advance(row * RECORD_NS)
-        roll[row] = plant.roll_rad
-    return roll, plant.capsized_s
 
 
 def active_run(

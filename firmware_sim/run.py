@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_sim.faulty_bench import FaultyBench, Tap
+from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_content import PASSIVE
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side, load_compiled_code
@@ -188,9 +189,14 @@ def join(name: str, ship: ShipRun, controller: ControllerRun, bus_load: float | 
 
 def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
     """Roll of the ship without tank every `RECORD_S`, shape (count,), and `capsized_s`."""
-    plant = bare_plant(scenario, seed)
+    return roll_at_zero_pressure(bare_plant(scenario, seed), count)
+
+
+def roll_at_zero_pressure(plant: Plant, count: int) -> tuple[FloatArray, float]:
+    """Roll with the pump, if any, at zero pressure; as `roll_without_tank`."""
     roll_rad = np.empty(count)
     for row in range(count):
+        plant.drive_pump(0.0, enabled=True)
         plant.advance(row * RECORD_NS)
         roll_rad[row] = plant.roll_rad
     return roll_rad, plant.capsized_s

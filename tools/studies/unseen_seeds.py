@@ -22,10 +22,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import yaml
 
-from firmware_sim.prediction import active_run, laws_of, loaded, passive_run
-from firmware_sim.run import RECORD_S
+from firmware_sim.prediction import active_run, laws_of, loaded
+from firmware_sim.run import RECORD_S, roll_at_zero_pressure
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
+from firmware_sim.ship_side import plant_of
 from firmware_sim.starter import CONTROLLER, SCENARIO, SHIP, StarterShip, make_starter
 from tools.printing import command_line, show
 from tools.studies.clairvoyant import clairvoyant_bound
@@ -153,7 +154,7 @@ def sailed(name: str, seed: int, *, with_bound: bool = True) -> dict[str, list[f
         return _linear(name, seed, with_bound=with_bound)
     of, count = case(name), round((SETTLE_S + WINDOW_S) / RECORD_S)
     plant = of.config.plant
-    rolls = {PASSIVE: passive_run(of.scenario, seed, count)[0]}
+    rolls = {PASSIVE: roll_at_zero_pressure(plant_of(of.scenario, seed), count)[0]}
     for law, built in laws(name).items():
         record, _ = active_run(of.scenario, plant, built, seed, count)
         rolls[law] = record["roll_rad"]
