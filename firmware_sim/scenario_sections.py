@@ -8,14 +8,14 @@ import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.elementary import sines_cosines
-from utank_hil.base.parameters import NotNegative, Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Checked, NotNegative, Positive, Problem, Range
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import Section
 from utank_hil.sea.sea import wavenumber_rad_m
 
 
 @dataclass(frozen=True, slots=True)
-class SensorErrors:
+class SensorErrors(Checked, owner="sensors"):
     """Errors of the sensors; noise is white and Gaussian, given as standard deviation.
 
     Raises `ValueError` if a value is out of its range, or the delay is not a multiple of the cycle.
@@ -33,16 +33,15 @@ class SensorErrors:
     #: Constant error of the roll, such as that of a misaligned sensor; 0.2 at most.
     roll_bias_rad: Annotated[float, Range(least=-0.2, most=0.2)] = 0.0
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if not problems and self.motion_delay_ms * 1_000_000 % TICK_NS:
-            reason = f"must be a multiple of {TICK_NS / 1e6:g}, got {self.motion_delay_ms}"
-            problems.append(("motion_delay_ms", reason))
-        refuse("sensors", problems)
+    def _problems(self) -> list[Problem]:
+        if self.motion_delay_ms * 1_000_000 % TICK_NS == 0:
+            return []
+        reason = f"must be a multiple of {TICK_NS / 1e6:g}, got {self.motion_delay_ms}"
+        return [("motion_delay_ms", reason)]
 
 
 @dataclass(frozen=True, slots=True)
-class DriveLimits:
+class DriveLimits(Checked, owner="drive"):
     """Limits on commands, set in the drive and independent of the controller."""
 
     pressure_pa: Positive = 50e3  #: Largest set-point to either side.
@@ -53,9 +52,6 @@ class DriveLimits:
     #: Voltage of the direct-current bus that feeds the drive; 4 to 1000, the range of
     #: DRIVE_STATUS_2.
     bus_voltage_v: Annotated[float, Range(least=4, most=1000)] = 1000.0
-
-    def __post_init__(self) -> None:
-        refuse("drive", range_problems(self))
 
 
 class Forecasts(Section):

@@ -29,7 +29,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import exp
-from utank_hil.base.parameters import ParameterError, Range, SampleTime, range_problems, refuse
+from utank_hil.base.parameters import Checked, ParameterError, Problem, Range, SampleTime
 from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, DesignPlant
 from utank_hil.control.semi_active import valve_range
 from utank_hil.dynamics.linear import coupled_matrices
@@ -108,7 +108,7 @@ class HeelingTank:
 
 
 @dataclass(frozen=True, slots=True)
-class HeelRemovalDesign:
+class HeelRemovalDesign(Checked, owner="heel removal"):
     """Heel removal at the quay as a law of a configuration."""
 
     target_rad: Annotated[float, Range(least=-0.1, most=0.1)] = 0.0  #: The heel that is wanted.
@@ -124,12 +124,10 @@ class HeelRemovalDesign:
     sample_time_s: SampleTime = 0.1
     kind: Literal["heel_removal"] = "heel_removal"
 
-    def __post_init__(self) -> None:
-        problems = range_problems(self)
-        if not problems and not self.stop_rad < self.start_rad:
-            reason = f"must be below start_rad, {self.start_rad:g}, got {self.stop_rad:g}"
-            problems.append(("stop_rad", reason))
-        refuse("heel removal", problems)
+    def _problems(self) -> list[Problem]:
+        if self.stop_rad < self.start_rad:
+            return []
+        return [("stop_rad", f"must be below start_rad, {self.start_rad:g}, got {self.stop_rad:g}")]
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""

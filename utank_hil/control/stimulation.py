@@ -22,7 +22,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray, plausible
 from utank_hil.base.elementary import sine_cosine
-from utank_hil.base.parameters import Positive, Problem, Range, SampleTime, range_problems, refuse
+from utank_hil.base.parameters import Checked, Positive, Problem, Range, SampleTime, refuse
 from utank_hil.control.interface import BuiltLaw, DesignPlant
 from utank_hil.dynamics import STATES, RollShip, Tank, coupled_matrices
 
@@ -32,7 +32,7 @@ SHORT = 0.01  # over the pressure's amplitude; a smaller shortfall is ignored
 
 
 @dataclass(frozen=True, slots=True)
-class StimulationDesign:
+class StimulationDesign(Checked, owner="stimulation"):
     """Parameters of the wanted roll.
 
     ValueError is raised if a parameter is not positive, the amplitude is at or above the roll
@@ -51,9 +51,6 @@ class StimulationDesign:
     duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
     kind: Literal["stimulate"] = "stimulate"
 
-    def __post_init__(self) -> None:
-        refuse("stimulation", range_problems(self) or self._limit_problems())
-
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Plan the stimulation for a plant, within its limits; no loop is closed to reduce roll."""
         parameters = {each.name: getattr(self, each.name) for each in fields(self)}
@@ -66,7 +63,7 @@ class StimulationDesign:
         )
         return BuiltLaw(law.controller, STATES, closes_loop=False)
 
-    def _limit_problems(self) -> list[Problem]:
+    def _problems(self) -> list[Problem]:
         problems = []
         if not self.amplitude_rad < self.roll_limit_rad:
             reason = f"{self.amplitude_rad} must be below roll_limit_rad {self.roll_limit_rad}"
