@@ -146,20 +146,20 @@ def _start(time: FloatArray, roll: FloatArray) -> FloatArray:
     return np.array([frequency, fall / frequency, 0.0, 0.0, heel, 0.0, roll[0] - heel, rate])
 
 
-def _motion(time: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the roll at the samples."""
+def _motion(time: FloatArray, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the roll at the samples and its derivatives by the parameters, shape (n, 8)."""
     from utank_hil.analysis.motion.decay_kernel import decay_motion  # This imports the compiler.
 
     run = decay_motion(time, p[[0, 1, 2, 3, 6, 7]])
     if not np.all(np.isfinite(run)):
         raise ValueError(_NO_DECAY)
-    return np.asarray(run + p[4] + p[5] * (time - time[0]))
+    since = time - time[0]
+    by = np.column_stack([run[:, 2:6], np.ones_like(time), since, run[:, 6:8]])
+    return run[:, 0] + p[4] + p[5] * since, by
 
 
-def _parameters(
-    time: FloatArray, roll: FloatArray, start: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the parameters that meet all samples best, and the roll's derivatives by them."""
+def _parameters(time: FloatArray, roll: FloatArray, start: FloatArray) -> FloatArray:
+    """Return the parameters that meet all samples best, in the order of `_start`."""
     size = float(np.max(np.abs(roll - start[4])))
     scale = np.array([start[0], 0.01, 0.1, 1.0, size, size / (time[-1] - time[0]), size, size])
     bounds = (
@@ -167,14 +167,14 @@ def _parameters(
         [2 * start[0], 2, 20, 20, np.inf, np.inf, np.inf, np.inf],
     )
     found = least_squares(
-        lambda p: _motion(time, p) - roll,
+        lambda p: _motion(time, p)[0] - roll,
         start,
-        "3-point",
+        lambda p: _motion(time, p)[1],
         bounds,
         x_scale=scale,
         max_nfev=50,  # good records take about ten
     )
-    return found.x, found.jac
+    return np.asarray(found.x)
 
 
 def _half_swings(time: FloatArray, period: float) -> FloatArray:
@@ -191,8 +191,8 @@ def _half_swings(time: FloatArray, period: float) -> FloatArray:
 
 def _fit(time: FloatArray, roll: FloatArray, start: FloatArray) -> RollDecay:
     """Fit all parameters to all samples."""
-    p, by = _parameters(time, roll, start)
-    fit = _motion(time, p)
+    p = _parameters(time, roll, start)
+    fit, by = _motion(time, p)
     rest = roll - fit
     swing = np.abs(fit - p[4] - p[5] * (time - time[0]))
     period = 2 * math.pi / p[0]

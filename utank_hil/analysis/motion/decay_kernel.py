@@ -1,4 +1,4 @@
-"""Roll of a free decay, by compiled Runge-Kutta steps."""
+"""Roll of a free decay and its derivatives by the parameters, by compiled Runge-Kutta steps."""
 
 import math
 
@@ -12,35 +12,51 @@ _STEP_RAD = 0.05
 
 
 @njit()
-def _acceleration(f: float, v: float, p: FloatArray) -> float:
-    w0, zeta, b2, k3 = float(p[0]), float(p[1]), float(p[2]), float(p[3])
-    return -2 * zeta * w0 * v - b2 * abs(v) * v - w0 * w0 * (f + k3 * f * f * f)
+def _slope(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
+    w0, zeta, b2, k3 = p[0], p[1], p[2], p[3]
+    f, v = x[0], x[1]
+    out[0] = v
+    out[1] = -2 * zeta * w0 * v - b2 * abs(v) * v - w0 * w0 * (f + k3 * f * f * f)
+    by_f = -w0 * w0 * (1 + 3 * k3 * f * f)
+    by_v = -2 * zeta * w0 - 2 * b2 * abs(v)
+    for n in range(6):
+        out[2 + n] = x[8 + n]
+        out[8 + n] = by_f * x[2 + n] + by_v * x[8 + n]
+    out[8] -= 2 * zeta * v + 2 * w0 * (f + k3 * f * f * f)
+    out[9] -= 2 * w0 * v
+    out[10] -= abs(v) * v
+    out[11] -= w0 * w0 * f * f * f
 
 
 @njit()
 def decay_motion(time: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the roll at the samples, shape (n,); infinite from where it grows beyond 2 rad.
+    """Return roll and rate, then the derivatives of both, at the samples.
 
-    `p`, shape (6,), is w0, zeta, b2, k3, first roll and rate.
+    `p`, shape (6,), is w0, zeta, b2, k3, first roll and rate. The result, shape (n, 14), is roll,
+    rate, the derivatives of roll by the six parameters and those of rate; infinite from where the
+    roll grows beyond 2 rad.
     """
-    out = np.full(len(time), np.inf)
-    f, v = p[4], p[5]
-    out[0] = f
+    out = np.full((len(time), 14), np.inf)
+    x, at, k, total = np.zeros(14), np.zeros(14), np.zeros(14), np.zeros(14)
+    x[0], x[1], x[6], x[13] = p[4], p[5], 1.0, 1.0
+    out[0] = x
     for n in range(1, len(time)):
         gap = time[n] - time[n - 1]
         steps = max(1, math.ceil(gap * p[0] / _STEP_RAD))
         h = gap / steps
         for _ in range(steps):
-            a1 = _acceleration(f, v, p)
-            v2 = v + h / 2 * a1
-            a2 = _acceleration(f + h / 2 * v, v2, p)
-            v3 = v + h / 2 * a2
-            a3 = _acceleration(f + h / 2 * v2, v3, p)
-            v4 = v + h * a3
-            a4 = _acceleration(f + h * v3, v4, p)
-            f += h / 6 * (v + 2 * (v2 + v3) + v4)
-            v += h / 6 * (a1 + 2 * (a2 + a3) + a4)
-        if not abs(f) < 2:
+            _slope(x, p, k)
+            for stage in range(4):
+                weight = 1.0 if stage in (0, 3) else 2.0
+                far = h if stage == 2 else h / 2
+                for i in range(14):
+                    total[i] = (0.0 if stage == 0 else total[i]) + weight * k[i]
+                    at[i] = x[i] + far * k[i]
+                if stage < 3:
+                    _slope(at, p, k)
+            for i in range(14):
+                x[i] += h / 6 * total[i]
+        if not abs(x[0]) < 2:
             break
-        out[n] = f
+        out[n] = x
     return out
