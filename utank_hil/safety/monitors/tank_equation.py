@@ -367,21 +367,31 @@ class TankEquation:
         return self._judge()
 
     def _judge(self) -> int:
-        found = 0
         self.obeyed = self.suspect = False
         self.doubt = self.level_gain = self.late_s = math.nan
         if self._sound.weight < self._filled:
             return 0
-        most_sway, xx, pp, both = self._most_sway, self._xx, self._pp, self._both
-        steady, zero, late_xx = self._steady, self._zero, self._xx_unsteady
-        sound = self._sound.least(most_sway, steady)
-        unsteady = self._sound_unsteady.least(most_sway, zero)
+        sound = self._sound.least(self._most_sway, self._steady)
+        unsteady = self._sound_unsteady.least(self._most_sway, self._zero)
         self._of_sway = self._spread + self._spread_of_share * self._sound.share
         spread = self._of_sway * math.sqrt(self._sound.uu)
+        found = self._judge_signs(sound, unsteady)
+        if self._does_not_answer(spread) and not found & Finding.WATER_SIGN:
+            found |= Finding.LEVEL_STUCK
+        if self._still > self._still_samples:
+            most = self._most_unmoved / math.sqrt(1 - self._keep) + spread
+            if unsteady > most * most:
+                found |= Finding.ROLL_STUCK
+        return found | Finding.MOTION_LATE if self._is_late() else found
+
+    def _judge_signs(self, sound: float, unsteady: float) -> int:
+        """Judge signs and a delay of a quarter of a period, by what the sound case leaves."""
+        most_sway, xx, pp, both = self._most_sway, self._xx, self._pp, self._both
+        steady, zero, late_xx = self._steady, self._zero, self._xx_unsteady
         held = LEAST_SHARE * LEAST_SHARE * pp + HELD_SHARE * HELD_SHARE * self._vv
         enough_x = xx > self._least_xx and xx > held
-        whole = self._samples > self._late_samples
-        enough_late = whole and late_xx > self._least_xx and late_xx > held
+        enough_late = late_xx > self._least_xx and late_xx > held
+        enough_late = enough_late and self._samples > self._late_samples
         enough_p = pp > self._least_pp and pp > self._pump_share * xx
         enough_both = both > self._least_xx + self._least_pp
         cases = (
@@ -395,8 +405,8 @@ class TankEquation:
             for case, most_zero, left, power, enough, finding in cases
             if enough
         ]
+        found, most_uu = 0, self._sound.uu
         moves = self._level_still <= self._crest_samples
-        most_uu = self._sound.uu
         # a part of a wave tells less: as an average of as many samples
         filled = math.sqrt(self._sound.weight * (1 - self._keep))
         best = min([other for other, *_ in judged], default=0.0)
@@ -414,27 +424,28 @@ class TankEquation:
                 other = case.least(most_sway, zero)
                 self.obeyed = self.obeyed or self._excess(other, straight, power, case.uu) > 1
                 self.suspect = self.suspect or self._excess(straight, other, power, most_uu) > 1
-        mean = self._push_sum / self._sound.weight
-        both -= mean * self._push_sum
-        if both > self._least_xx + self._least_pp:
-            slope_both = self._slope_both - mean * self._sound.u
-            feigned = spread * math.sqrt(both) + max(most_sway * slope_both, 0.0)
-            level_both = self._level_both - mean * self._level_sum
-            self.level_gain = gain = (level_both + feigned) / both
-            if gain < STUCK_GAIN and not found & Finding.WATER_SIGN:
-                found |= Finding.LEVEL_STUCK
-        if self._still > self._still_samples:
-            most = self._most_unmoved / math.sqrt(1 - self._keep) + spread
-            if unsteady > most * most:
-                found |= Finding.ROLL_STUCK
-        dd = self._dd
-        if dd > self._least_dd and whole:
-            feigned = self._spread * math.sqrt(self._late_uu * dd)
-            feigned -= min(most_sway * self._slope_lead, 0.0)
-            self.late_s = late_s = (self._lead - feigned) / dd
-            if late_s > self._late_limit_s:
-                found |= Finding.MOTION_LATE
         return found
+
+    def _does_not_answer(self, spread: float) -> bool:
+        """Whether the level does not answer the push; `spread` is what sway may leave."""
+        mean = self._push_sum / self._sound.weight
+        both = self._both - mean * self._push_sum
+        if not both > self._least_xx + self._least_pp:
+            return False
+        slope_both = self._slope_both - mean * self._sound.u
+        feigned = spread * math.sqrt(both) + max(self._most_sway * slope_both, 0.0)
+        self.level_gain = (self._level_both - mean * self._level_sum + feigned) / both
+        return self.level_gain < STUCK_GAIN
+
+    def _is_late(self) -> bool:
+        """Whether the water leads the roll by more than it may."""
+        dd = self._dd
+        if not (dd > self._least_dd and self._samples > self._late_samples):
+            return False
+        feigned = self._spread * math.sqrt(self._late_uu * dd)
+        feigned -= min(self._most_sway * self._slope_lead, 0.0)
+        self.late_s = (self._lead - feigned) / dd
+        return self.late_s > self._late_limit_s
 
     def _excess(self, worse: float, better: float, power: float, uu: float) -> float:
         """Return how far one case leaves more than another, which has the true signs from 1 on.
