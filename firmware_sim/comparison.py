@@ -162,12 +162,20 @@ class Record:
     runs: Runs
 
     @property
+    def scenario(self) -> dict[str, Any]:
+        """Scenario; empty where the record has none, as one of a ship at sea."""
+        for key in ("scenario_configuration", "configuration"):  # a log has it beside the law's
+            found = self.about.get(key)
+            if isinstance(found, dict) and "sea" in found:
+                return found
+        return {}
+
+    @property
     def waves(self) -> str | None:
         """Description of the waves as text; None where the record has none."""
-        scenario = self.about.get("configuration", {})
-        if "sea" not in scenario:
+        if not self.scenario:
             return None
-        parts = {key: scenario.get(key) for key in _WAVES}
+        parts = {key: self.scenario.get(key) for key in _WAVES}
         # data files count by content: folders may differ
         text = json.dumps([parts, self.about.get("seed")], sort_keys=True)
         for name, digest in self.about.get("data", {}).items():
@@ -177,7 +185,7 @@ class Record:
     def columns(self, run: str) -> Columns:
         """Columns of one run without the initial time that its scenario leaves out."""
         columns = self.runs[run]
-        settle_s = self.about.get("configuration", {}).get("settle_s", 0.0)
+        settle_s = self.scenario.get("settle_s", 0.0)
         kept = columns["time_s"] >= columns["time_s"][0] + settle_s
         return {name: values[kept] for name, values in columns.items()}
 
@@ -207,7 +215,6 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
 
 def _records_compared(first: Record, second: Record) -> list[Comparison]:
     found = []
-    together = first.waves is not None and first.waves == second.waves
     if len(first.runs) == len(second.runs) == 1:  # a log has no names of runs
         pairs = [(next(iter(first.runs)), next(iter(second.runs)))]
     else:
@@ -234,10 +241,10 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
             continue
         remarks += _in_charge(run, one, two)
         times = one["time_s"], two["time_s"]
-        same = together and len(times[0]) == len(times[1])
-        same = same and bool(np.abs(times[0] - times[1]).max(initial=0) < 1e-3)
-        if not same:
-            remarks.append("not the same waves at the same times: not paired")
+        apart = _why_apart(first, second, *times)
+        same = not apart
+        if apart:
+            remarks.append(f"{apart}: not paired")
         counts = [batch_count(each) for each in (one, two)]
         if same:
             counts = [min(counts)] * 2
@@ -255,6 +262,18 @@ def _records_compared(first: Record, second: Record) -> list[Comparison]:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * LEAST_PERIODS} rolls")
         found.append(Comparison(str(second.path), run, figures, {}, tuple(remarks)))
     return found
+
+
+def _why_apart(first: Record, second: Record, one_s: FloatArray, two_s: FloatArray) -> str:
+    """Why two runs can't be paired; empty if they can."""
+    unknown = [str(each.path) for each in (first, second) if each.waves is None]
+    if unknown:
+        return f"waves unknown, as no scenario is in {' and '.join(unknown)}"
+    if first.waves != second.waves:
+        return "not the same waves"
+    if len(one_s) != len(two_s) or np.abs(one_s - two_s).max(initial=0) >= 1e-3:
+        return "the same waves, but not at the same times"
+    return ""
 
 
 def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:

@@ -248,6 +248,7 @@ def frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
     head = replay_head(
         "bench", job.controller, job.law, job.frames.parent, options={"run": job.name},
         retuner=desks.retuner is not None, estimating=desks.estimating is not None, seed=job.seed,
+        scenario=job.scenario.model_copy(update={"controllers": {}}),
     )  # fmt: skip
     with FrameLogWriter(job.frames, head) as writer:
         sink = BlockSink(writer, block_ns)

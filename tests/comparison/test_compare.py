@@ -138,7 +138,10 @@ def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path):
     assert figure["half_width"] == pytest.approx(0.2 * single.half_width, rel=1e-2)
     assert not apart["figures"]["roll_rms_rad"]["paired"]
     assert apart["figures"]["roll_rms_rad"]["half_width"] > figure["half_width"]
-    assert "not the same waves" in apart["remarks"][0]
+    assert apart["remarks"] == ["not the same waves: not paired"]
+    shorter = recorded(tmp_path / "d.rrd", roll[:-20], **about)
+    (each,) = found(first, shorter)["comparisons"]
+    assert each["remarks"] == ["the same waves, but not at the same times: not paired"]
 
 
 @pytest.mark.usefixtures("read_here")
@@ -152,6 +155,8 @@ def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_ha
     assert list(each["figures"]) == ["roll_rms_rad"]
     figure = each["figures"]["roll_rms_rad"]
     assert figure["value"] == pytest.approx(0.5 * figure["reference"], rel=1e-4)
+    said = f"waves unknown, as no scenario is in {first} and {table}: not paired"
+    assert said in each["remarks"]
     table.write_text("time_s,pitch_deg\n0,1\n")
     done = CliRunner().invoke(APP, [str(first), str(table)])
     assert done.exit_code == 2

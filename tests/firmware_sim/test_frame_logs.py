@@ -10,6 +10,7 @@ import yaml
 from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
+from firmware_sim import comparison
 from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.run import Job, run_in_one_process, run_lockstep
@@ -73,6 +74,21 @@ def test_a_run_is_the_same_with_a_frame_log_which_is_replayed_exactly(
     np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
     result = replayed(file)
     assert (result.first, result.ticks) == (None, 2480 if faults else 2500)
+
+
+def test_logs_of_one_bench_are_compared_in_the_same_waves_without_the_beginning(
+    tmp_path: Path,
+) -> None:
+    files = [tmp_path / f"{name}.frames" for name in ("passive", "dpc")]
+    for file in files:
+        job = job_of(file.stem, 4.0, [])
+        scenario = job.scenario.model_copy(update={"settle_s": 1.0})
+        run_lockstep(replace(job, scenario=scenario, frames=file))
+    assert FrameLog(files[0]).head["files"] == {}  # a replay needs no sea
+    (each,) = comparison.compare_records(files[0], files[1:])
+    assert all(figure.paired for figure in each.figures.values())
+    record = comparison.read_record(files[0])
+    assert record.columns("passive")["time_s"][0] == pytest.approx(1.0)
 
 
 def test_a_run_in_real_time_leaves_a_log_that_is_replayed_exactly(tmp_path: Path) -> None:

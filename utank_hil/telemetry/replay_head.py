@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from utank_hil.base.finite import mapped
 from utank_hil.base.provenance import commit, describe, version
@@ -70,15 +70,18 @@ def replay_head(
     estimating: bool,
     commissioned: bool = True,
     seed: int | None = None,
+    scenario: BaseModel | None = None,
 ) -> dict[str, Any]:
     """Describe a run so that it can be replayed elsewhere; ready for `json.dumps`.
 
     `command` has the `options`, `folder` is that of the log, `seed` that of simulated waves and
-    noise. `retuner`, `estimating` and `commissioned` say what the controller has and whether it
-    could be armed. The head holds ``about`` (`utank_hil.base.provenance`), every number of the
-    ``law`` and the content of the data ``files``.
+    noise, `scenario` that of the waves. `retuner`, `estimating` and `commissioned` say what the
+    controller has and whether it could be armed. The head holds ``about``
+    (`utank_hil.base.provenance`), every number of the ``law`` and the content of the data
+    ``files``.
     """
-    about = describe(command, config, folder, options=options, seed=seed)
+    about = describe(command, config, folder, options=options, seed=seed, scenario=scenario)
+    needed = describe(command, config, folder, options={})["data"]  # not those of the sea
     return {
         "about": about,
         "retuner": retuner,
@@ -87,7 +90,7 @@ def replay_head(
         "packages": _packages(),
         "catalogue": load_catalogue().version,
         "law": law_values.encoded(law_values.law_values(law.controller())),
-        "files": {name: packed((folder / name).read_bytes()) for name in about["data"]},
+        "files": {name: packed((folder / name).read_bytes()) for name in needed},
     }
 
 
