@@ -191,6 +191,36 @@ def test_a_damaged_dbc_is_refused_by_its_name(tmp_path, content):
     )
 
 
+@pytest.mark.parametrize(
+    ("device", "key", "remedy"),
+    [
+        ({"motion": SBG | {"messages": {"a": "B"}}}, "dbc", "name the maker's .dbc"),
+        ({"motion": SBG | {"messages": {"a": "TPDO1"}}}, "eds", "name the maker's .eds or .dcf"),
+        ({"pump": DRIVE}, "eds", "name the maker's .eds or .dcf"),
+        ({"motion": {"accept_unprotected": True}}, "profile", "or name a file by dbc or eds"),
+    ],
+)
+@pytest.mark.parametrize("file", ["ship.yaml", "./ship.yaml", "./none.yaml", "./empty.dat"])
+def test_a_file_of_another_kind_is_refused_in_a_line_with_key_file_and_remedy(
+    tmp_path, device, key, remedy, file
+):
+    (tmp_path / "empty.dat").touch()
+    (role, content), *_ = device.items()
+    (said,) = problems(tmp_path, {role: content | {key: file}}).splitlines()
+    assert said.startswith(f"{tmp_path}/ship.yaml: devices.{role}: ")
+    assert key in said
+    assert file.removeprefix("./") in said
+    assert ("relative to this file" if "none" in file and key != "profile" else remedy) in said
+    assert len(said) < 400 + len(str(tmp_path)) * 3
+
+
+@pytest.mark.parametrize("value", [None, 5, [], {}, ""])
+@pytest.mark.parametrize("key", ["dbc", "eds"])
+def test_a_file_s_name_that_is_none_is_refused(tmp_path, key, value):
+    said = problems(tmp_path, {"motion": SBG | {key: value, "messages": {"a": "TPDO1"}}})
+    assert f"devices.motion: {key}: must be the path of a file" in said
+
+
 def test_a_message_of_nearly_that_name_is_named(tmp_path):
     (tmp_path / "theirs.dbc").write_text(
         'VERSION ""\nBO_ 5 EKF_EULER: 8 X\n SG_ R : 0|8@1+ (1,0) [0|0] "" X\n'

@@ -188,6 +188,14 @@ def test_path_of_a_data_file_is_relative_to_the_file_that_names_it(tmp_path):
     assert load_config(top, Scenario).ship.name == str(tmp_path / "ships" / "data.txt")
 
 
+def test_a_data_file_is_named_by_its_key_where_it_is_a_yaml_file(tmp_path):
+    write(tmp_path, "ships/a.yaml", "length_m: 20\nname: A\n")
+    words = "sea: {kind: tabulated, file: ../ships/a.yaml, effective_slope: {coefficient: 0.5}}\n"
+    top = write(tmp_path, "seas/sea.yaml", words)
+    with pytest.raises(ConfigError, match=r"seas/sea\.yaml: sea\.file: .*ships/a\.yaml"):
+        load_config(top, SeaHolder)
+
+
 def test_a_name_of_a_file_beside_the_one_that_names_it_is_its_path(tmp_path, monkeypatch):
     """Wherever the command is called from; the name of a ship is text, whatever stands beside."""
     write(tmp_path, "seas/table.csv", "frequency_hz,density_m2_hz\n0.08,1\n0.1,4\n0.12,2\n")

@@ -18,6 +18,7 @@ from utank_hil.configuration.yaml_text import parse_yaml
 OF_AN_EDS: Final = "EDS "  #: Begins the name of a device whose layouts were read from an EDS.
 FRAME_BYTES: Final = 8
 LIMIT_BYTES: Final = 1 << 22  #: Of a file; those of drives have some 100 kB.
+LONGEST_WHY: Final = 150  #: Characters of a library's reason, which may hold a file's first line.
 ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
 """A file has no mark of its encoding. The last decodes anything; numbers are ASCII in all three."""
 _SIGNED: Final = {2: 8, 3: 16, 4: 32, 0x10: 24, 0x12: 40, 0x13: 48, 0x14: 56, 0x15: 64}
@@ -33,17 +34,33 @@ _INDENT: Final = re.compile(r"^[ \t]+", re.MULTILINE)
 _NODE: Final = re.compile(r"^\$NODEID\s*\+?\s*|\s*\+\s*\$NODEID$", re.IGNORECASE)
 
 
+def _named_file(content: dict[str, Any], kind: str) -> str:
+    """The file that a section names by this key."""
+    file = content[kind]
+    if isinstance(file, str) and file:
+        return file
+    raise ValueError(f"{kind}: must be the path of a file, such as ./theirs.{kind}")
+
+
 def _text(kind: str, file: str, encodings: tuple[str, ...]) -> str:
     """Read a file in the first encoding that it is text in."""
     try:
         with open_content(Path(file), LIMIT_BYTES) as opened:
             content = opened.read()
     except OSError as error:
-        raise ValueError(f"{kind}: {file} can't be read: {error.strerror}") from error
+        remedy = f"write its path relative to this file, as ./theirs.{kind}"
+        raise ValueError(f"{kind}: {file} can't be read: {error.strerror}; {remedy}") from error
     for encoding in encodings:
         with suppress(UnicodeDecodeError):
             return content.decode(encoding)
-    raise ValueError(f"{kind}: {file} is text in none of {', '.join(encodings)}")
+    raise _another(kind, file, f"is text in none of {', '.join(encodings)}")
+
+
+def _another(kind: str, file: str, why: str) -> ValueError:
+    """A file of another kind."""
+    wanted = ".eds or .dcf" if kind == "eds" else f".{kind}"
+    why = " ".join(why.split())[:LONGEST_WHY]
+    return ValueError(f"{kind}: {file} is no {kind.upper()}: {why}; name the maker's {wanted}")
 
 
 class Eds:
@@ -54,13 +71,13 @@ class Eds:
         parser = ConfigParser(
             interpolation=None, delimiters=("=",), inline_comment_prefixes=(";", "#")
         )
+        text = _INDENT.sub("", _text("eds", file, ENCODINGS))  # no value goes on in another line
         try:
-            text = _INDENT.sub(
-                "", _text("eds", file, ENCODINGS)
-            )  # no value goes on in another line
             parser.read_string(text, Path(file).name)
         except Error as error:
-            raise ValueError(f"eds: {file} is no EDS: {' '.join(error.message.split())}") from error
+            raise _another("eds", file, error.message) from error
+        if not parser.sections():
+            raise _another("eds", file, "has no section")
         self._sections = {name.upper(): dict(parser[name]) for name in parser.sections()}
 
     def entry(self, place: Place) -> dict[str, str] | None:
@@ -195,7 +212,7 @@ def with_eds(content: dict[str, Any]) -> dict[str, Any]:
     rest = {key: value for key, value in content.items() if key not in ("eds", "messages")}
     named = _named(content, "eds", r"[TR]PDO[1-9][0-9]*")
     pdos = [of for of, _ in named.values() if of[0] in "Tt"]
-    eds = eds_file(str(content["eds"]))
+    eds = eds_file(_named_file(content, "eds"))
     _same_node(eds, content)
     if profile := eds.number(Place(0x1000)) & 0xFFFF:
         rest = {"canopen_profile": profile, "identity": _identity(eds)} | rest
@@ -220,7 +237,7 @@ def with_eds(content: dict[str, Any]) -> dict[str, Any]:
 
 def drive_with_eds(content: dict[str, Any]) -> dict[str, Any]:
     """A drive's section with the identity of its file, if that is a drive which can be watched."""
-    eds = eds_file(str(content["eds"]))
+    eds = eds_file(_named_file(content, "eds"))
     _same_node(eds, content)
     rest = {key: value for key, value in content.items() if key != "eds"}
     kind = eds.number(Place(0x1000)) & 0xFFFF
@@ -371,7 +388,8 @@ def _otherwise(layout: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any
 def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     """Replace the names of messages by their layouts; the file is not needed any longer."""
     rest = {key: value for key, value in content.items() if key not in ("dbc", "messages")}
-    layouts, file = _dbc_layouts(str(content["dbc"])), content["dbc"]
+    file = _named_file(content, "dbc")
+    layouts = _dbc_layouts(file)
     meant = set(_words([content.get(key) for key in ("signals", "valid_when", "protection")]))
     messages: dict[str, dict[str, Any]] = {}
     named: dict[str, dict[str, int]] = {}
@@ -403,7 +421,7 @@ def _with_dbc(content: dict[str, Any]) -> dict[str, Any]:
     cycles_ms = [each["cycle_ms"] for each in messages.values() if each.get("cycle_ms")]
     if len(cycles_ms) == len(messages) and "cycle_ms" not in rest:
         rest["cycle_ms"] = max(cycles_ms)
-    return {"profile": f"{OF_A_DBC}{Path(str(file)).name}", **rest, "messages": messages}
+    return {"profile": f"{OF_A_DBC}{Path(file).name}", **rest, "messages": messages}
 
 
 def _in_numbers(condition: Any, named: dict[str, dict[str, int]], file: str) -> Any:
@@ -460,13 +478,12 @@ def _dbc_layouts(file: str) -> dict[str, dict[str, Any]]:
     text = _text("dbc", file, DBC_ENCODINGS)
     for numbers in _DBC_SIZES.finditer(text):  # the library makes room for what they say
         if any(len(each) > 5 or int(each) > _MOST_BITS for each in numbers.groups() if each):
-            raise ValueError(f"dbc: {file} is no DBC: {numbers[0].strip()!r} is in no message")
+            raise _another("dbc", file, f"{numbers[0].strip()!r} is in no message")
     database = Database(strict=False)  # one message that does not fit spoils no other
     try:
         database.add_dbc_string(text)
     except Exception as error:  # a damaged file makes the library raise errors of any kind
-        why = f"{error}" or type(error).__name__
-        raise ValueError(f"dbc: {file} is no DBC: {why}") from error
+        raise _another("dbc", file, f"{error}" or type(error).__name__) from error
     return {message.name: _layout(message) for message in database.messages}
 
 

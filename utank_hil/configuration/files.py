@@ -1,9 +1,9 @@
 """Reader of configuration files: YAML that may name other YAML files, with errors at their place.
 
 A value that is the name of a ``.yaml`` or ``.yml`` file stands for that file's content, and one
-that begins with ``./`` or ``../``, or names a file beside it, is the path of a data file; both are
-relative to the file they stand in. The key ``name`` of a file is text, whatever it looks like.
-Every error carries the file and key where the wrong value was written.
+that begins with ``./`` or ``../``, or names a file beside it, is the path of a data file, as is
+that of a key for one. Both are relative to the file they stand in. The key ``name`` of a file is
+text, whatever it looks like. Every error carries file and key of the wrong value.
 """
 
 import os
@@ -23,6 +23,16 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 _LIMIT_BYTES: Final = 1 << 22  #: Largest file: four megabytes take half a minute to parse.
 _SUFFIXES: Final = (".yaml", ".yml")
+_OF_OTHERS: Final = (
+    "dbc",
+    "direction_file",
+    "eds",
+    "file",
+    "profile",
+    "roll_moment_table",
+    "table",
+)
+"""Keys whose value is no file of this program."""
 ALLOW_CODE: Final = "allow_code"  #: Key of the context: whether the file may name code to run.
 
 
@@ -274,7 +284,8 @@ class _Reader:
                 self._resolve(item, (*key, index), file, stack) for index, item in enumerate(value)
             ]
         named = key[-1:] == ("name",) and key[:-1] in self.origins
-        if isinstance(value, str) and value.lower().endswith(_SUFFIXES) and not named:
+        ours = isinstance(value, str) and value.lower().endswith(_SUFFIXES) and not named
+        if ours and key[-1] not in _OF_OTHERS:
             return self.read(file.parent / value, key, stack, key)
         beside = isinstance(value, str) and "." in value and os.path.isfile(file.parent / value)
         if isinstance(value, str) and (value.startswith(("./", "../")) or (beside and not named)):
