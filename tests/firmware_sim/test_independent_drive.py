@@ -138,6 +138,20 @@ def test_the_ship_rolls_less_for_minutes_and_a_stop_stops_it(torque):
     assert (bench.node.mode, bench.motor.state) == (Mode.STANDBY, OFF)
 
 
+def test_a_drive_is_not_called_silent_by_a_message_it_may_not_send_yet():
+    """It has no power for 13 s, and is then configured for two."""
+    bench = at_sea()
+    bench.drive.killed = True
+    bench.to(13)
+    heard = bench.node.inbox
+    assert bench.node.safety.alarms.codes == {Fault.DRIVE_SILENT}
+    assert "node 5: 1000h:0 can't be read" in heard.received(Fault.DRIVE_SILENT)
+    bench.drive.killed = False
+    bench.until(lambda: bench.node.mode is not Mode.INIT, 6)
+    bench.to(bench.run.now_ns / SECOND + 1)
+    assert bench.node.safety.alarms.codes == {Fault.DRIVE_SILENT}
+
+
 def killed(bench):
     bench.drive.killed = True
 

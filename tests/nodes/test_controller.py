@@ -26,6 +26,7 @@ from utank_hil.canbus import (
     ControlWord,
     DriveFault,
     DriveState,
+    DriveStatus1,
     DriveStatus2,
     Fault,
     Frame,
@@ -48,6 +49,7 @@ from utank_hil.retuning import EstimateFigures, RetuningEvent
 from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
+from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.situation import Demand
 
 START_NS = 7_000_000_123
@@ -542,6 +544,19 @@ def test_a_message_that_is_expected_is_missed():
     bench.run(1500)
     assert Fault.NODE_SILENT in bench.node.safety.alarms.codes
     assert not bench.node.safety.supervisor.degraded
+
+
+@pytest.mark.parametrize("more_ms", range(0, 200, 30))
+def test_devices_that_start_after_the_controller_were_not_silent(more_ms):
+    """They are found silent before they start, and until each stream is looked at again."""
+    bench = ControllerBench(START_NS, monitors=new_monitors())
+    bench.silent = {DriveStatus1, DriveStatus2}
+    bench.run(2000 + more_ms)
+    assert bench.node.safety.situation.found & Finding.NODE_SILENT
+    bench.silent = set()
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    assert not bench.node.safety.alarms.codes
 
 
 def test_frames_of_other_kinds_fill_the_bus_too():

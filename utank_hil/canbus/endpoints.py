@@ -58,18 +58,19 @@ class Acceptance:
     `rejected` those that were not, by `Rejection`. `valid` is the state of the stream by a leaky
     bucket, +1 for a rejected and -1 for an accepted frame: False before the first accepted frame,
     and from `BUCKET_LIMIT` until the bucket is empty again. `changes` are frames with a new
-    content, which who hears a message that is also sent on a change counts; else 0.
+    content, which who hears a message that is also sent on a change counts; else 0. `may_speak` is
+    False while its sender is being configured, and silent by right.
     """
 
     __slots__ = (
         "_bucket", "_candidate", "_counts", "_expected", "_run",
-        "can_id", "changes", "cycle_ns", "heard", "lost", "rejected", "valid",
+        "can_id", "changes", "cycle_ns", "heard", "lost", "may_speak", "rejected", "valid",
     )  # fmt: skip
 
     def __init__(self, can_id: int, cycle_ns: int, counts: int) -> None:
         self.can_id = can_id
         self.cycle_ns = cycle_ns
-        self.valid = False
+        self.valid, self.may_speak = False, True
         self.heard = self.lost = self.changes = 0
         self.rejected = dict.fromkeys(Rejection, 0)
         self._counts = counts

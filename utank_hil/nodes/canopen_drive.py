@@ -149,6 +149,7 @@ class CanopenDrive:
                 self._restart(now_ns)
             return []
         frames = setup.frames(now_ns)
+        self.watched[1].may_speak = setup.done
         if setup.done:
             self._started_ns = now_ns
         if setup.problem != self._told:

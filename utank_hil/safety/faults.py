@@ -144,8 +144,9 @@ FAULTS: Final = (
          "DRIVE_STATUS_2.",
          "Find the identifier that is missing on the bus (candump), and in docs/can-catalogue.md "
          "whose it is; check that device's supply, bus connection and firmware.",
-         _found(_WARN, "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired "
-             "inputs, silent for 1 s", Finding.NODE_SILENT)),
+         _found(_WARN, "DRIVE_STATUS_2 (TPDO2 of a CANopen drive, once it is configured), or a "
+             "heartbeat of drive, sensors, valve or hard-wired inputs, silent for 1 s",
+             Finding.NODE_SILENT)),
     _row(Fault.VALVE_SILENT, "The tank's valve sends no status, or does not receive the commands "
          "in time.",
          "Check the valve's supply and bus connection. If its status arrives but its command "

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection
 from typing import Final
 
-from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.base.tick import LONG_AGO_NS, TICK_NS, TICK_S
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.canbus.measurements import Measurements, MotionSample
@@ -32,6 +32,8 @@ MOST_ERRORS: Final = 8
 """So many errors of devices are told while the alarm of the first one lasts."""
 QUIET_START_NS: Final = 10_000_000_000
 """What is awaited at the start is an alarm only when it has not come by then."""
+LOOKED_AT_NS: Final = 300_000_000
+"""From the last alarms in INIT: all streams of messages have been looked at since."""
 _TEN: Final = 10
 
 _OF_PACE: Final = {
@@ -117,6 +119,7 @@ class Safety:
         self._motion = 0
         self._start_ns: int | None = None
         self._alarming = False
+        self._init_ns = LONG_AGO_NS
         self._passing: dict[Fault, Gravity] = {}
         self._errors: set[str] = set()
         self._mode_before = _INIT
@@ -237,7 +240,10 @@ class Safety:
         supervisor, alarms = self.supervisor, self.alarms
         mode = supervisor.mode
         quiet = self._start_ns is None or now_ns - self._start_ns < QUIET_START_NS
-        self._alarming = self._alarming or mode is not _INIT or not quiet
+        if mode is _INIT:
+            self._init_ns = now_ns
+        ready = now_ns - self._init_ns >= LOOKED_AT_NS
+        self._alarming = self._alarming or ready or not quiet
         for code in accepted:
             alarms.accept(code, mode, now_ns)
         if not alarms.is_active(Fault.DEVICE_ERROR):

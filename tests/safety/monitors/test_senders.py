@@ -16,6 +16,7 @@ class Counted:
     lost: int = 0
     changes: int = 0
     can_id: int = 1
+    may_speak: bool = True
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
 
 
@@ -214,6 +215,14 @@ def test_silent_node_is_found_after_a_second():
     senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
     found = [senders.update(0, STEP_S) for _ in range(14)]
     assert found.index(Finding.NODE_SILENT) in (10, 11)
+
+
+def test_a_device_that_may_not_speak_yet_is_silent_from_when_it_may():
+    counted = Counted(CYCLE_NS, may_speak=False)
+    stream = Stream(counted, silent_s=1.0)
+    assert [stream.update(0.5) for _ in range(9)] == [0] * 9
+    counted.may_speak = True
+    assert [stream.update(0.5) for _ in range(4)] == [0, 0, SILENT, SILENT]
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.05, False), (0.3, True), (0.8, True)])

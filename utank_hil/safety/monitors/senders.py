@@ -53,6 +53,7 @@ class Heard(Protocol):
 
     can_id: int
     cycle_ns: int
+    may_speak: bool
     rejected: dict[Rejection, int]
 
     @property
@@ -71,7 +72,8 @@ class Heard(Protocol):
 class Stream:
     """Pace of one cyclic message.
 
-    A silence of `silent_s` is found; it is infinite where others judge it.
+    A silence of `silent_s` is found; it is infinite where others judge it. Who may not speak is not
+    silent.
     """
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
@@ -111,7 +113,8 @@ class Stream:
             excess -= self._on_change(elapsed_s)
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
-        self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
+        waits = heard or not receiver.may_speak
+        self._silent_s = 0.0 if waits else self._silent_s + elapsed_s
         missing = self._missing + lost - LOST_SHARE * came
         if heard:  # a silence is judged elsewhere, its first and last look too
             slow = came < LEAST_PER_CYCLE * cycles
