@@ -110,9 +110,9 @@ class CanopenPumpDrive(CanopenNode):
         connected = self.state is cia.NetworkState.OPERATIONAL and not self.lost_controller
         if self._connected and not connected and self.enabled:
             self._abort_connection()
-        failed = self.entries[cia.Place(0x1001)].value
-        if connected and failed and states.state is not DriveState.FAULT:
-            self.emergency(0)  # the controller is heard again
+        heard_again = connected and not self._connected
+        if heard_again and entries[cia.Place(0x1001)].value and states.state is not DriveState.FAULT:
+            self.emergency(0)
         self._connected = connected
         self._own_pa = pressure_pa = self._turn()
         broken = None if plant.power_cut else plant.broken_pump

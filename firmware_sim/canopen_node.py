@@ -71,6 +71,11 @@ class CanopenNode:
                 entries[Place(index, 5)] = Entry(0, 2, writable=True)
 
     @property
+    def canopen(self) -> tuple["CanopenNode", ...]:
+        """Itself."""
+        return (self,)
+
+    @property
     def hears(self) -> frozenset[int]:
         """Identifiers that the node takes; heartbeats are those of any node."""
         own = (cia.NMT, cia.SYNC, cia.RECEIVED_1 + self.node, cia.SDO_REQUEST + self.node)

@@ -97,11 +97,6 @@ class ForeignFrames:
             self.server.receive(frame, now_ns)
         self._claims |= self.plan.wake is not None and frame.can_id == self.plan.wake.can_id
 
-    def swap(self) -> None:
-        """Put another CANopen node of the same kind in its place."""
-        if self.server is not None:
-            self.server.swap()
-
     def tick(self, now_ns: int) -> list[Frame]:
         """What a CANopen node sends by itself, and an address claim at its start and on request."""
         frames = [] if self.server is None else self.server.tick(now_ns)
@@ -229,10 +224,10 @@ class SensorNode:
         self.hears |= device.hears
         self._foreign.append((device, measure))
 
-    def swap(self) -> None:
-        """Put other CANopen sensors of the same kind in the place of its own."""
-        for device, _ in self._foreign:
-            device.swap()
+    @property
+    def canopen(self) -> list[CanopenSensor]:
+        """Its CANopen sensors."""
+        return [each.server for each, _ in self._foreign if each.server is not None]
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take what is asked of a CANopen sensor."""

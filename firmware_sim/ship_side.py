@@ -205,7 +205,7 @@ class ForeignPanel(OperatorPanel):
         self.hears |= self._frames.hears
         #: What it sends, by the identifier of the message that it stands for.
         self.devices = {self._sender.can_id: self._frames}
-        self.swap = self._frames.swap
+        self.canopen = () if self._frames.server is None else (self._frames.server,)
         self._proves = plan.authentication
         self._challenge = b""
         if self._proves is not None:

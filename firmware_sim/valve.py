@@ -213,7 +213,7 @@ class ForeignValve(ValveNode):
         #: What it sends, by the identifier of the message that it stands for.
         self.devices = {self._statuses.can_id: self._frames}
         self.hears = self._frames.hears.union(self._command.can_ids)
-        self.swap = self._frames.swap
+        self.canopen = () if self._frames.server is None else (self._frames.server,)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a command that is whole and in order."""

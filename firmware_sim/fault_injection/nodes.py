@@ -1,8 +1,10 @@
 """Faults of nodes, pump, drive, valve and law."""
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Literal
 
+from firmware_sim.canopen_node import CanopenNode
 from firmware_sim.fault_injection.bench_parts import Bench, LawFailure, Span, Spoiled
 from firmware_sim.fault_injection.fault import Fault, NodeName, one_of
 from utank_hil.base.elementary import exp
@@ -10,13 +12,19 @@ from utank_hil.base.parameters import Finite, NotNegative, Range
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import DriveFault, Frame
 from utank_hil.canbus.frame import OTHER_BUS, STANDARD
-from utank_hil.configuration.device_sections import Id11
+from utank_hil.configuration.device_sections import EmergencyCode, Id11
 
 
 class NodeFault(Fault):
     """Fault of a node."""
 
     node: NodeName
+
+    def _canopen(self, bench: Bench) -> Sequence[CanopenNode]:
+        devices = getattr(bench.nodes[self.node].node, "canopen", ())
+        if not devices:
+            raise ValueError(f"{self.node} is no CANopen device, as this fault needs")
+        return devices
 
 
 class Silenced(NodeFault):
@@ -81,11 +89,21 @@ class Replaced(NodeFault):
     kind: Literal["replaced"]
 
     def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        for each in self._canopen(bench):
+            bench.nodes[self.node].at(span.begin_ns, each.swap)
+
+
+class Emergency(NodeFault):
+    """A CANopen device sends an emergency message (EMCY), and one without error at the end."""
+
+    kind: Literal["emergency"]
+    code: EmergencyCode  #: Its emergency error code, CiA 301.
+
+    def _place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         node = bench.nodes[self.node]
-        swap = getattr(node.node, "swap", None)
-        if swap is None:
-            raise ValueError(f"{self.node} is no CANopen device: it has no identity to change")
-        node.at(span.begin_ns, swap)
+        for each in self._canopen(bench):
+            node.at(span.begin_ns, partial(each.emergency, self.code))
+            node.at(span.end_ns, partial(each.emergency, 0))
 
 
 class Link(NodeFault):

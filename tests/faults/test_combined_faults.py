@@ -158,8 +158,8 @@ def combined(draw):
 def test_every_kind_of_fault_is_drawn():
     annotations = (each.model_fields["kind"].annotation for each in get_args(KINDS))
     known = {kind for annotation in annotations for kind in get_args(annotation)}
-    # no native node can be replaced: only a CANopen device has an identity
-    assert {*faults_of("SENSOR_MOTION", "sensors"), "replaced"} == known
+    # only a CANopen device has an identity, and says what ails it
+    assert {*faults_of("SENSOR_MOTION", "sensors"), "replaced", "emergency"} == known
 
 
 def pair(*faults):

@@ -223,12 +223,16 @@ def test_an_emulated_node_maps_objects_of_any_number_and_gaps():
     assert [node.entries[Place(0x1A00, n)].value for n in (1, 2)] == [0x91300120, 0x00050008]
 
 
-def test_a_native_node_has_no_identity_to_change():
+@pytest.mark.parametrize(
+    ("fault", "node"),
+    [({"kind": "replaced"}, "drive"), ({"kind": "emergency", "code": 0x4210}, "sensors")],
+)
+def test_a_native_node_has_no_identity_to_change_and_no_emergencies(fault, node):
     scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
-    drive = build_ship_side(scenario, 1, scenario.operator).drive
-    bench = SimpleNamespace(nodes={"drive": FaultyNode(drive)})
-    with pytest.raises(ValueError, match="no CANopen device"):
-        fault_of({"kind": "replaced", "node": "drive"}).place(bench, 0, 0)
+    side = build_ship_side(scenario, 1, scenario.operator)
+    bench = SimpleNamespace(nodes={each.name: FaultyNode(each) for each in side.nodes})
+    with pytest.raises(ValueError, match=f"{node} is no CANopen device"):
+        fault_of({**fault, "node": node}).place(bench, 0, 0)
 
 
 def test_a_slow_sensor_of_another_maker_takes_the_place_of_a_fast_one_that_is_gone():

@@ -34,6 +34,7 @@ _WHOLE: Final = BeforeValidator(_whole)
 Whole = Annotated[int, Range(least=-(1 << 63), most=(1 << 64) - 1), _WHOLE]
 Name64 = Annotated[int, Range(least=0, most=(1 << 64) - 1), _WHOLE]
 Id29 = Annotated[int, Range(least=0, most=LONGEST_ID), _WHOLE]
+EmergencyCode = Annotated[int, Range(least=1, most=0xFFFF), _WHOLE]
 Id11 = Annotated[int, Range(least=0, most=LONGEST_STANDARD_ID), _WHOLE]
 Pgn = Annotated[int, Range(least=0, most=0x3FFFF), _WHOLE]
 SourceAddress = Annotated[int, Range(least=0, most=0xFD), _WHOLE]
