@@ -110,8 +110,8 @@ class CanopenPumpDrive(CanopenNode):
         connected = self.state is cia.NetworkState.OPERATIONAL and not self.lost_controller
         if self._connected and not connected and self.enabled:
             self._abort_connection()
-        heard_again = connected and not self._connected
-        if heard_again and entries[cia.Place(0x1001)].value and states.state is not DriveState.FAULT:
+        failed = entries[cia.Place(0x1001)].value and not self._connected
+        if connected and failed and states.state is not DriveState.FAULT:  # it is heard again
             self.emergency(0)
         self._connected = connected
         self._own_pa = pressure_pa = self._turn()

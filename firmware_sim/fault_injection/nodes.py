@@ -21,7 +21,7 @@ class NodeFault(Fault):
     node: NodeName
 
     def _canopen(self, bench: Bench) -> Sequence[CanopenNode]:
-        devices = getattr(bench.nodes[self.node].node, "canopen", ())
+        devices: Sequence[CanopenNode] = getattr(bench.nodes[self.node].node, "canopen", ())
         if not devices:
             raise ValueError(f"{self.node} is no CANopen device, as this fault needs")
         return devices

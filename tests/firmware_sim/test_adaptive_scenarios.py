@@ -120,7 +120,13 @@ def test_load_change_in_a_storm_is_noticed_and_retuned_for() -> None:
     run = cached_run_of("load_change.yaml", "gpc")
     changed_ns = scenario("load_change.yaml").actual_from_s * 1e9
     states = [event.state for event in run.retuning]
-    assert states[:4] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
-    assert "ship has changed" in run.retuning[0].reasons[0]
+    # a law for the first record may gain too little over the configured one, and no more than that
+    refused = [event for event in run.retuning if event.state is RetuningState.REFUSED]
+    assert len(refused) <= 1
+    assert all("less than 5% to gain" in event.reasons[0] for event in refused)
+    assert states[-4:] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
+    assert len(states) == 4 + 3 * len(refused)
+    begun = [event for event in run.retuning if event.state is IDENTIFY]
+    assert all("ship has changed" in event.reasons[0] for event in begun)
     assert changed_ns < run.retuning[0].time_ns < changed_ns + 900e9
     assert run.refused_commands == 0
