@@ -36,6 +36,7 @@ def compare(
     from firmware_sim.campaign.store import ABOUT
     from firmware_sim.comparison import compare_campaigns, compare_records
     from firmware_sim.report_page import RECORDING
+    from utank_hil.base.text_files import where_instead
 
     places = [reference, *others]
     campaigns = [(place / ABOUT).is_file() for place in places]
@@ -46,6 +47,8 @@ def compare(
         if not (file.is_file() or campaign):
             wanted = f"{RECORDING} or {ABOUT}" if place.is_dir() else "such file"
             named = "name a folder of `bench` or `campaign`, or a file"
+            if not place.exists():
+                named += f"; {where_instead(place)}"
             fail(f"{place}: there is no {wanted}; {named}")
     with failing(ValueError):
         if all(campaigns):

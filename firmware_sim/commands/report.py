@@ -38,8 +38,9 @@ def report(
         first = runs[0].resolve()
         page = first.with_name(f"{first.stem}-and-{len(runs) - 1}-more.html")
     with failing(OSError, ValueError):
+        reports = [_report(run) for run in runs]
         page.parent.mkdir(parents=True, exist_ok=True)
-        written = write_report_page(page, *joined([_report(run) for run in runs]))
+        written = write_report_page(page, *joined(reports))
     if json_:
         print_json({"page": str(written), "bytes": written.stat().st_size})
     else:

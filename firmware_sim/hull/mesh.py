@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scipy.special import gamma
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.base.text_files import open_content
+from utank_hil.base.text_files import open_content, where_instead
 from utank_hil.dynamics.roll_damping import HullForm
 
 Panels = npt.NDArray[np.int64]
@@ -63,7 +63,8 @@ def read_mesh(
 
     cpt.set_logging("ERROR")  # its checks of single panels say less than ours
     if not path.is_file():
-        raise MeshError("is a folder" if path.is_dir() else "there is no such file")
+        absent = f"there is no such file; {where_instead(path)}"
+        raise MeshError("is a folder" if path.is_dir() else absent)
     kind = path.suffix.lower()
     if kind in _BY_MESHIO and find_spec("meshio") is None:
         raise MeshError(f"{kind} needs meshio: pip install 'utank-hil[hulls]'")

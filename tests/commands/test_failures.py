@@ -52,7 +52,8 @@ def test_a_recording_that_can_not_be_read_is_named_with_the_reason(
     folder.mkdir()
     binary.write_bytes(b"\xff\xfe\x00\x01" + bytes(range(256)))
     for words in commands_for(missing):
-        assert refused(*words) == f"error: {missing}: No such file or directory"
+        said = refused(*words)
+        assert said.startswith(f"error: {missing}: No such file or directory; it is not in ")
     for words in commands_for(folder):
         assert refused(*words) == f"error: {folder}: is a folder; name a file in it"
     for words in commands_for(binary):
@@ -69,7 +70,8 @@ def test_an_export_that_can_not_be_written_is_named_and_not_left_in_half(
     assert not file.exists()
     nowhere = tmp_path / "no" / file.name
     said = refused("export", LOG, "--to", nowhere)
-    assert said == f"error: {nowhere}: No such file or directory"
+    there = f"there is no folder {nowhere.parent}"
+    assert said == f"error: {nowhere}: No such file or directory; {there}"
 
 
 @pytest.mark.usefixtures("few_rolls")

@@ -118,6 +118,23 @@ MISTAKES: list[tuple[str, str, tuple[str, ...]]] = [
      "--listen 127.0.0.1:99999", ("--listen", "port")),
     ("all addresses by another name", f"panel {{configs}}/{FIRST} --bus can0 --web --listen 0:0",
      ("--listen", "one address")),
+    *((f"no file for {words.partition(' ')[0]} {number}", words,
+       ("tabel.csv", "did you mean {here}/table.csv?"))
+      for number, words in enumerate((
+          "report {here}/tabel.csv", "replay {here}/tabel.csv", "bench {here}/tabel.csv",
+          "export {here}/tabel.csv --to {here}/x.csv", "check {here}/tabel.csv",
+          "compare {here}/tabel.csv {here}/table.csv", "monitor {here}/tabel.csv",
+          "identify decay {here}/tabel.csv", f"identify log {{here}}/tabel.csv {{configs}}/{GPC}",
+          f"identify sea {{here}}/tabel.csv --ship {{configs}}/{FIRST}",
+          "identify inclining {here}/tabel.csv --displacement 2000", "bus {here}/tabel.csv",
+          "hull {here}/tabel.csv --gm 1 --gyration 3", "campaign {here}/tabel.csv",
+          "design tank {here}/tabel.csv", "faults {here}/tabel.csv",
+          "run {here}/tabel.csv --bus can0", "panel {here}/tabel.csv --bus can0",
+          "commission {here}/tabel.csv --bus can0",
+      ))),
+    ("a folder that is not there", "report {here}/nothing/a.frames",
+     ("there is no folder {here}/nothing",)),
+    ("a name like no other", "replay {here}/zzzzzzzz.frames", ("it is not in {here}",)),
     ("an address with two points", f"panel {{configs}}/{FIRST} --bus can0 --web "
      "--listen 127.0..1:8047", ("--listen", "one address")),
     ("a sea of no height", f"init {{here}}/a {' '.join(SHIP)} --roll-period 10 --hs 0",
@@ -189,7 +206,7 @@ IN_A_FILE: list[tuple[str, str, str, object, tuple[str, ...]]] = [
      {"kind": "regular", "amplitude_m": 1.0, "period_s": 0}, ("sea.period_s", "above 0")),
     ("matrices that are not there", GPC, "law",
      {"kind": "state_space", "measured": ["roll_rad"], "system": "./x.npz"},
-     ("law.system", "x.npz", "No such file")),
+     ("law.system", "x.npz", "No such file", "beside the file")),
     ("a scenario for a ship", GPC, "vessel", str(CONFIGS / STORM), ("vessel", "storm.yaml")),
 ]  # fmt: skip
 

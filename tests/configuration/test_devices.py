@@ -210,7 +210,7 @@ def test_a_file_of_another_kind_is_refused_in_a_line_with_key_file_and_remedy(
     assert said.startswith(f"{tmp_path}/ship.yaml: devices.{role}: ")
     assert key in said
     assert file.removeprefix("./") in said
-    assert ("relative to this file" if "none" in file and key != "profile" else remedy) in said
+    assert ("beside the file" if "none" in file and key != "profile" else remedy) in said
     assert len(said) < 400 + len(str(tmp_path)) * 3
 
 

@@ -11,9 +11,10 @@ import re
 import zlib
 from array import array
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from itertools import chain
+from difflib import get_close_matches
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, BinaryIO, Final, TextIO
 
@@ -27,6 +28,7 @@ LIMIT_BYTES: Final = 1 << 30
 """Largest content that is read whole."""
 VALUES_LIMIT: Final = 40_000_000
 """Most values of a table that are held, 320 MB: a day at 10 Hz with 46 columns."""
+_MOST_NAMES: Final = 1000  #: Of a folder that are compared with one that is not there.
 LINE_LIMIT: Final = 1 << 16
 """Longest line of a log in characters; that of a CAN FD frame has some 300."""
 
@@ -46,6 +48,28 @@ def refuse_device(path: Path) -> None:
         raise TextFileError(f"{path}: is a folder; name a file in it")
     if path.exists() and not path.is_file():
         raise TextFileError(f"{path}: is no regular file but a pipe, socket or device")
+
+
+def where_instead(path: Path) -> str:
+    """Say where what is not at a path may be: under a name like it, or that its folder lacks."""
+    folder = path.parent
+    if not folder.is_dir():
+        return f"there is no folder {folder}"
+    with suppress(OSError):  # a folder that must not be read names nothing
+        others = sorted(
+            islice(folder.iterdir(), _MOST_NAMES), key=lambda each: each.suffix == path.suffix
+        )
+        by_stem = {each.stem: each for each in others}  # of one stem that of the same kind
+        if near := get_close_matches(path.stem, by_stem, n=1):
+            return f"did you mean {by_stem[near[0]]}?"
+    return f"it is not in {folder.absolute()}: name it with its folder"
+
+
+def unread(error: OSError) -> str:
+    """Say that a data file of a configuration can't be read, and where its name is looked up."""
+    missing = isinstance(error, FileNotFoundError)
+    remedy = "; a path begins beside the file that names it" if missing else ""
+    return f"{error.filename} can't be read: {error.strerror}{remedy}"
 
 
 @contextmanager

@@ -43,6 +43,7 @@ def monitor(
 
     **Example:** utank-hil monitor out
     """
+    from utank_hil.base.text_files import where_instead
     from utank_hil.telemetry.highlight import highlight_s
     from utank_hil.telemetry.live import LiveStream, live_runs
     from utank_hil.telemetry.recording import write_recording
@@ -62,7 +63,8 @@ def monitor(
             return
         file = Path(source) / "bench.rrd" if Path(source).is_dir() else Path(source)
         if not file.is_file():
-            fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
+            named = f"give a recording, a bench's folder, or {LIVE}...; {where_instead(file)}"
+            fail(f"{file}: is not there; {named}")
         if file.suffix != SUFFIX:
             watch(file, highlight_s([*read_recording(file).values()]), json_=json_)
             return

@@ -114,6 +114,7 @@ def _replay_bus_log(
     log: BusLog, chosen: ControllerConfig | None, explained: ExplainedTick | None
 ) -> tuple[ReplayResult, list[str]]:
     if chosen is None:
+        log.path.stat()  # of what is not there no more is said
         fail(
             f"{log.path} is no {SUFFIX} file, so it says nothing of the controller: name its "
             "configuration by --config"

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from utank_hil.base.text_files import open_content
+from utank_hil.base.text_files import open_content, unread
 from utank_hil.canbus import profiles
 from utank_hil.canbus.profiles import drive_plan as cia
 from utank_hil.canbus.profiles.drive_plan import MODES, Place
@@ -48,8 +48,7 @@ def _text(kind: str, file: str, encodings: tuple[str, ...]) -> str:
         with open_content(Path(file), LIMIT_BYTES) as opened:
             content = opened.read()
     except OSError as error:
-        remedy = f"write its path relative to this file, as ./theirs.{kind}"
-        raise ValueError(f"{kind}: {file} can't be read: {error.strerror}; {remedy}") from error
+        raise ValueError(f"{kind}: {unread(error)}") from error
     for encoding in encodings:
         with suppress(UnicodeDecodeError):
             return content.decode(encoding)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Final, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from utank_hil.base.parameters import ParameterError, Problem
-from utank_hil.base.text_files import open_text, refuse_device
+from utank_hil.base.text_files import open_text, refuse_device, where_instead
 from utank_hil.configuration.error_words import known_keys, nearest, words_for
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
@@ -206,6 +206,8 @@ class _Reader:
                 text = content_of.read()
         except (OSError, RuntimeError, ValueError) as error:
             reason = f"can't be read: {_why(error).removeprefix(f'{file}: ')}"
+            if isinstance(error, FileNotFoundError):
+                reason += f"; {where_instead(file)}"
             if namer is None:
                 return self._give_up(key, ConfigProblem(file, "", reason))
             where, within = self._within(namer)

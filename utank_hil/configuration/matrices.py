@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from utank_hil.base.apart import apart
-from utank_hil.base.text_files import open_text
+from utank_hil.base.text_files import open_text, unread
 from utank_hil.control.state_space import SystemMatrices
 
 _NAMES: Final = ("A", "B", "C", "D")
@@ -41,6 +41,8 @@ def read_system(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path.name} must be a file of {', '.join(readers)}")
     try:
         content = _unwrapped(reader(path))
+    except FileNotFoundError as error:
+        raise ValueError(unread(error)) from error
     except OSError as error:
         raise ValueError(f"{path} can't be read: {error.strerror or error}") from error
     except ImportError as error:

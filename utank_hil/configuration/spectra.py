@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
-from utank_hil.base.text_files import kind_of, read_number_table
+from utank_hil.base.text_files import kind_of, read_number_table, unread
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -187,7 +187,7 @@ class TabulatedSpectrum(Section):
         try:
             columns = read_number_table(self.file)
         except OSError as error:
-            raise ValueError(_unread(error)) from error
+            raise ValueError(unread(error)) from error
         except ValueError as error:
             other = f"a table has the columns {' and '.join(_BANDS)}"
             measured = "a file of a buoy or of a wave model is kind: measured"
@@ -199,13 +199,6 @@ class TabulatedSpectrum(Section):
             return Spectrum(columns["frequency_hz"], columns["density_m2_hz"])
         except ValueError as error:
             raise ValueError(f"{self.file}: {error}") from error
-
-
-def _unread(error: OSError) -> str:
-    """Say that a data file can't be read, and where its name is looked up."""
-    missing = isinstance(error, FileNotFoundError)
-    remedy = "; a path begins beside the file that names it" if missing else ""
-    return f"{error.filename} can't be read: {error.strerror}{remedy}"
 
 
 def utc(time: datetime) -> datetime:
@@ -255,7 +248,7 @@ def read_spectra(
         written = tuple(each.stat().st_mtime_ns for each in (file, direction_file) if each)
         return _loaded(file, direction_file, place, written)
     except OSError as error:
-        raise ValueError(_unread(error)) from error
+        raise ValueError(unread(error)) from error
 
 
 @lru_cache(maxsize=4)

@@ -113,9 +113,16 @@ def new_app(
 
 def why(error: object) -> str:
     """What an error says: of one of the system its file and its reason, without Python's words."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
-    return str(error)
+    if not (isinstance(error, OSError) and error.strerror):
+        return str(error)
+    if error.filename is None:
+        return error.strerror
+    remedy = ""
+    if isinstance(error, FileNotFoundError) and isinstance(error.filename, str | Path):
+        from utank_hil.base.text_files import where_instead
+
+        remedy = f"; {where_instead(Path(error.filename))}"
+    return f"{error.filename}: {error.strerror}{remedy}"
 
 
 def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:

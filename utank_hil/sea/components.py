@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.base.text_files import read_number_table
+from utank_hil.base.text_files import read_number_table, unread
 from utank_hil.base.whole_file import write_whole
 from utank_hil.sea.ndbc import HIGHEST_M
 from utank_hil.sea.sea import BEAM_RAD, Sea
@@ -27,7 +27,7 @@ def read_components(file: Path, heading_rad: float = BEAM_RAD) -> Sea:
     try:
         columns = read_number_table(file)
     except OSError as error:
-        raise ValueError(f"{file} can't be read: {error.strerror}") from error
+        raise ValueError(unread(error)) from error
     if set(columns) - {"heading_deg"} != set(COLUMNS):
         raise ValueError(
             f"{file} needs the columns {', '.join(COLUMNS)}, and may have heading_deg; it has "

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.elementary import phasors
-from utank_hil.base.text_files import read_number_table
+from utank_hil.base.text_files import read_number_table, unread
 
 COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
 
@@ -35,7 +35,7 @@ class MomentTable:
         try:
             columns = read_number_table(file)
         except OSError as error:
-            raise ValueError(f"{file} can't be read: {error.strerror}") from error
+            raise ValueError(unread(error)) from error
         if set(columns) != set(COLUMNS):
             has = ", ".join(columns)
             raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {has}")

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Finite, Positive, Range
-from utank_hil.base.text_files import open_content
+from utank_hil.base.text_files import open_content, unread
 from utank_hil.configuration.files import Section
 from utank_hil.dynamics.hull.hull_data import HullData
 
@@ -99,7 +99,7 @@ def text(path: Path) -> str:
         with open_content(path, _LIMIT_BYTES) as content:
             return content.read().decode("latin-1")
     except OSError as error:
-        raise ValueError(f"{path} can't be read: {error.strerror}") from error
+        raise ValueError(unread(error)) from error
 
 
 def sibling(path: Path, suffix: str) -> Path | None:
