@@ -90,7 +90,8 @@ class StarterShip:
                 "beam and displacement; ships have 0.35 to 0.9: it is in metres"
             )
             return [("draught_m", reason)]
-        most_m = (self.draught_m or math.inf) + self.beam_m**2 / (12 * depth_m)  # KB and BM
+        draught_m = self.draught_m or depth_m / 1.025 / _BLOCK[0]
+        most_m = draught_m + self.beam_m**2 / (12 * depth_m)  # KB and BM
         if self.gm_m > most_m:
             reason = f"is {self.gm_m:g} m, and the metacentre {most_m:.3g} m above the keel at most"
             return [("gm_m", f"{reason}: it is in metres")]

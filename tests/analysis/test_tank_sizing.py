@@ -134,6 +134,14 @@ def test_room_that_is_too_small_is_told():
         size_tank(PATROL, dataclasses.replace(ROOM, length_m=0.5))
 
 
+@pytest.mark.parametrize(("gm_m", "period_s"), [(24, 1.3), (9, 2.3), (0.9, 2.6), (12, 6)])
+def test_of_a_ship_too_stiff_for_a_tank_its_gm_and_period_are_named_not_the_room(gm_m, period_s):
+    why = f"GM of {gm_m:g} m with a roll period of {period_s:g} s .* too stiff .* Check both"
+    with pytest.raises(TankImpossibleError, match=why) as refused:
+        size_tank(ship_of(1900, gm_m, period_s), ROOM)
+    assert "room" not in str(refused.value)
+
+
 @pytest.mark.parametrize("share", [0.02, 0.3, math.nan])
 def test_share_beyond_all_use_is_refused(share):
     with pytest.raises(ValueError, match=r"stability_share must be 0\.03 to 0\.25"):

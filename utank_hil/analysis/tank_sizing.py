@@ -25,6 +25,7 @@ from utank_hil.base.parameters import Checked, Finite, Positive, Range, refuse
 from utank_hil.control.optimal_tank import best_passive_tank, ship_ratios
 from utank_hil.dynamics import GRAVITY_M_S2, RollShip, Tank
 from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.ship import STIFFEST
 
 STABILITY_SHARE: Final = 0.15  #: Default share of the ship's stability that the free surface takes.
 LEAST_STABILITY_SHARE: Final = 0.03
@@ -162,11 +163,28 @@ def size_tank(
     assert found is not None
     if wanted < LEAST_STABILITY_SHARE:
         raise TankImpossibleError(
-            f"{bound_by}, lets a tank take {wanted:.1%} of the stability, and below "
+            _too_stiff(ship, room)
+            or f"{bound_by}, lets a tank take {wanted:.1%} of the stability, and below "
             f"{LEAST_STABILITY_SHARE:.0%} it does too little: a wider room (now "
             f"{room.breadth_m:.1f} m) or a longer one would help"
         )
     return replace(found, bound_by=bound_by)
+
+
+def _too_stiff(ship: RollShip, room: TankRoom) -> str:
+    """Why no room helps a ship that is far stiffer than others of her breadth; else empty."""
+    period_s = 2 * math.pi / ship.natural_frequency_rad_s
+    least_s, gm_m = (
+        STIFFEST * math.sqrt(room.breadth_m),
+        ship.stiffness_nm_rad / ship.displacement_n,
+    )
+    if period_s >= least_s and gm_m <= room.breadth_m / 4:
+        return ""
+    return (
+        f"a GM of {gm_m:.3g} m with a roll period of {period_s:.3g} s is of a ship too stiff for "
+        f"one: others {room.breadth_m:.3g} m across have a GM below {room.breadth_m / 4:.2g} m and "
+        f"roll in {least_s:.2g} s or more. Check both: metres, and seconds of a swing to both sides"
+    )
 
 
 def _in_room(
@@ -198,7 +216,8 @@ def _in_room(
                 tank = best_passive_tank(ship, tank)
         except ValueError as error:
             raise TankImpossibleError(
-                f"no water in this room can be tuned to a roll period of "
+                _too_stiff(ship, room)
+                or f"no water in this room can be tuned to a roll period of "
                 f"{2 * math.pi / ship.natural_frequency_rad_s:.3g} s: {error}"
             ) from error
     length_m = area_m2 / breadth_m

@@ -28,6 +28,10 @@ MOST_SWAY: Final = 1.0
 """Share of g times the slope by which the water particles at the surface are accelerated: a hull
 in long waves goes with them."""
 
+STIFFEST: Final = 1.6
+"""Roll period in s over the root of the breadth in m, below which few ships roll: by T = 0.8 B /
+sqrt(GM), GM is a quarter of the breadth."""
+
 _MOST = 1e30  # Far beyond any ship; it keeps the results of designs finite.
 
 

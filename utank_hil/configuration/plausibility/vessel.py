@@ -8,6 +8,7 @@ from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollShip, Tank, coupled_
 from utank_hil.dynamics.nonlinear import righting_range
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.pump_curve import pump_load, pump_speed
+from utank_hil.dynamics.ship import STIFFEST
 from utank_hil.dynamics.valves import Valve
 
 
@@ -112,7 +113,7 @@ def _of_ship(ship: RollShip, tank: Tank) -> list[Figure]:
     frequency = ship.natural_frequency_rad_s
     period_s = 2 * math.pi / frequency
     beam = f"for a ship that holds a tank {tank.width_m:g} m wide"
-    # T = 0.8 B / sqrt(GM): GM is 0.25 of the width at 1.6, 1.5 % of it at 6.5
+    # T = 0.8 B / sqrt(GM): GM is 1.5 % of the width at 6.5
     of_width = period_s / math.sqrt(tank.width_m)
     critical = 2 * ship.inertia_kg_m2 * frequency
     swing = 8 / (3 * math.pi) * frequency * _ROLL_RAD  # of the linear damping of the same energy
@@ -128,7 +129,7 @@ def _of_ship(ship: RollShip, tank: Tank) -> list[Figure]:
         Figure("ship.damping_nms_rad", total, 0, 0.004 if total > 0 else 0, _ANY, _ANY,
                f"makes a damping ratio of {total:.2g} with all other damping of the ship; hulls "
                "have 0.005 to 0.15: it is in N m s"),
-        Figure("ship.inertia_kg_m2", of_width, 0.35, 1.6, _ANY, _ANY,
+        Figure("ship.inertia_kg_m2", of_width, 0.35, STIFFEST, _ANY, _ANY,
                f"gives a roll period of {period_s:.2g} s, short {beam}: inertia_kg_m2 is in kg m2 "
                f"(in t m2 it would be {period_s * _PER_1000:.3g} s), stiffness_nm_rad in N m"),
         Figure("ship.stiffness_nm_rad", of_width, 0, 0, 6.5, 25,
