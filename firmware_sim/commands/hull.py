@@ -73,12 +73,13 @@ def hull(
         side, said = read_mesh(mesh, draught, trim, scale)
         with notes.busy(f"{shown(mesh)}: {2 * side.nb_faces} panels, computing"):
             data, found, wrong = compute_hull(side, loading, str(out))
+        figures = hull_figures(found)
     for text in (*said, *wrong):
         say_note(f"{mesh}: {text}")
     write_hull(out, data)
     length_m, half_m, draught_m = map(float, np.ptp(side.vertices, axis=0))
     sizes = {"length_m": length_m, "beam_m": 2 * half_m, "draught_m": draught_m}  # below water
-    figures = sizes | hull_figures(found)
+    figures = sizes | figures
     if json_:
         common.print_json({"file": str(out), "panels": 2 * side.nb_faces, **figures})
         return

@@ -20,7 +20,12 @@ from firmware_sim.hull.mesh import MeshError, form_mesh
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import left_whole
 from utank_hil.configuration.hull_files.capytaine import GIVEN, hull_of_dataset
-from utank_hil.dynamics.hull.hull_data import HullData, with_roll_period
+from utank_hil.dynamics.hull.hull_data import (
+    HullData,
+    UncoveredError,
+    free_roll,
+    with_roll_period,
+)
 from utank_hil.dynamics.hull.lateral import LateralHull
 from utank_hil.dynamics.roll_damping import HullForm
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -56,7 +61,8 @@ def compute_hull(
 
     `side` is the wetted port side as a mesh of Capytaine, see `mesh`; without frequencies they go
     from waves of 150 beams to what the panels can follow, one beam at least. MeshError is raised if
-    its panels are too few, or the loading does not belong to the hull.
+    its panels are too few, the frequencies around the roll had to be left out, or the loading does
+    not belong to the hull.
     """
     import capytaine as cpt
     import xarray as xr
@@ -101,17 +107,33 @@ def compute_hull(
     if len(omega) - len(wrong) < 2:
         raise MeshError("radiates other energy than it takes from waves: is it a ship's hull?")
     data = data.sel(omega=[at for at in data["omega"].values if at not in wrong])
-    found = hull_of_dataset(Path(name), data)
+    kept = hull_of_dataset(Path(name), data)
     gyration = np.array([loading.gyration_m or 0.4 * beam_m, *[_GYRATION * length_m] * 2])
     inertia = mass_kg * np.diag(gyration**2)
-    found = replace(found, mass_kg=mass_kg, gravity_centre_m=centre_m, inertia_kg_m2=inertia)
-    if loading.roll_period_s is not None:
-        found = with_roll_period(found, loading.roll_period_s)
+    body: Any = {"mass_kg": mass_kg, "gravity_centre_m": centre_m, "inertia_kg_m2": inertia}
+    try:
+        found = _rolling(replace(kept, **body), loading, wrong)
+    except UncoveredError as error:
+        _rolling(replace(found, **body), loading, wrong)  # not covered with what was lost either
+        lost = ", ".join(f"{at:.3g}" for at in wrong)
+        raise MeshError(
+            f"{error.gap}: energy does not add up at {lost} rad/s, which are left out: take "
+            "finer panels"
+        ) from error
     axes = ("influenced_dof", "radiating_dof")
     data["inertia_matrix"] = xr.DataArray(found.mass_matrix, dims=axes, attrs={GIVEN: 1})
     said = [f"energy does not add up, irregular frequency or too coarse: {at:.3g} rad/s left out"
             for at in wrong]  # fmt: skip
     return data, found, said
+
+
+def _rolling(hull: HullData, loading: Loading, lost: FloatArray) -> HullData:
+    """Return the hull with the period of a loading; UncoveredError where the lost left a gap."""
+    if loading.roll_period_s is not None:
+        return with_roll_period(hull, loading.roll_period_s)
+    if len(lost):
+        free_roll(hull)
+    return hull
 
 
 def _refuse_gyration(gm_m: float, loading: Loading, beam_m: float) -> None:

@@ -207,6 +207,34 @@ def test_a_voyage_needs_hull_data_at_every_heading(tmp_path):
         hull_scenario(sea=still, hull=hull, voyage=[{"time_s": 5.0, "speed_m_s": 3.0}])
 
 
+@pytest.mark.parametrize(
+    ("name", "lost"),
+    [
+        ("added_mass", (0.0, 0.9)),
+        ("added_mass", (0.6, 1.1)),
+        ("excitation_force", (0.77, 2.0)),
+        ("excitation_force", (0.6, 1.1)),
+    ],
+)
+def test_a_hull_without_frequencies_around_its_roll_is_refused_at_its_key(tmp_path, name, lost):
+    """The roll is at 0.8 rad/s; what is no number is left out by the reader."""
+    with xarray.open_dataset(HULL["file"]) as whole:
+        rough = whole.load().copy(deep=True)
+    if name not in rough:
+        rough["excitation_force"] = rough["Froude_Krylov_force"] + rough["diffraction_force"]
+    rough[name] = rough[name].where(~((rough.omega > lost[0]) & (rough.omega < lost[1])))
+    rough.to_netcdf(tmp_path / "rough.nc")
+    hull = {**HULL, "file": str(tmp_path / "rough.nc")}
+    words = "frequency_rad_s has none near the free roll, 0.* compute the hull there, too"
+    with pytest.raises(ValidationError, match=rf" hull does not fit: .*{words}"):
+        hull_scenario(hull=hull)
+    ship = tmp_path / "ship.yaml"
+    content = {"name": "wigley", "ship": {"hull": hull}, "tank": {}, "emulated": True}
+    ship.write_text(json.dumps(content))
+    with pytest.raises(ConfigError, match=rf"ship\.hull.*{words}"):
+        load_config(ship, Vessel)
+
+
 @pytest.mark.parametrize("plant", ["sway_roll_yaw", "six_degrees"])
 def test_a_hull_in_a_turn_heels_outward_and_its_water_lies_square_to_gravity_and_turn(plant):
     rate_rad_s, speed_m_s, lever_m, mass_kg = math.radians(1.0), 6.0, 2.0, 1e6

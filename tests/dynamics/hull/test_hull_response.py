@@ -5,7 +5,14 @@ from hulls import made_up_hull
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.dynamics.hull.hull_data import excitation_at, free_roll, radiation_at, wave_number
+from utank_hil.dynamics.hull.hull_data import (
+    UncoveredError,
+    excitation_at,
+    free_roll,
+    radiation_at,
+    wave_number,
+    with_roll_period,
+)
 
 MIRROR = np.array([1, -1, 1, -1, 1, -1])
 
@@ -79,3 +86,34 @@ def test_at_resonance_roll_is_effective_slope_over_twice_the_damping():
 def test_an_unstable_ship_has_no_roll_period():
     with pytest.raises(ValueError, match="GM must be positive"):
         free_roll(ship(hydrostatic=np.diag([0.0, 0, 5, -1, 9, 0])))
+
+
+def with_grid(motions, waves):
+    """The ship of one roll, with frequencies of motions and of waves."""
+    n, random = len(motions), np.random.default_rng(2)
+    added = np.tile(np.diag([1.0, 4, 4, 2, 7, 8]), (n, 1, 1))
+    force = random.normal(size=(2, len(waves), 6))
+    return ship(
+        frequency_rad_s=motions, added_mass=added, damping=added / 20,
+        wave_frequency_rad_s=waves, excitation=force,
+    )  # fmt: skip
+
+
+AROUND = [0.1, 0.58, 0.62, 2.0]
+
+
+@pytest.mark.parametrize("grid", [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9], [0.1, 0.45, 0.75, 2.0], [0.5]])
+@pytest.mark.parametrize("name", ["frequency_rad_s", "wave_frequency_rad_s"])
+def test_a_roll_that_the_frequencies_leave_out_is_refused(name, grid):
+    """Outside of the data, or in a gap of them, waves push her otherwise, or not at all."""
+    grids = {"frequency_rad_s": AROUND, "wave_frequency_rad_s": AROUND} | {name: grid}
+    hull = with_grid(*grids.values())
+    words = rf"hull: {name} has none near the free roll, 0\.6 rad/s \(10\.5 s\).*compute"
+    for find in (free_roll, lambda hull: with_roll_period(hull, 2 * np.pi / 0.6)):
+        with pytest.raises(UncoveredError, match=words):
+            find(hull)
+
+
+def test_a_roll_is_found_where_the_first_guess_is_outside_of_the_data():
+    assert 2 * np.pi / free_roll(with_grid([0.58, 0.62], AROUND)).period_s == pytest.approx(0.6)
+    assert 2 * np.pi / free_roll(with_grid([0.6], [0.6])).period_s == pytest.approx(0.6)

@@ -125,12 +125,12 @@ def test_energy_adds_up_and_a_frequency_at_which_it_does_not_is_named(monkeypatc
     irregular = math.sqrt(G * k / math.tanh(10 * k))
     monkeypatch.setattr(compute, "_lid", lambda side: None)
     side = cpt.Mesh(*box(40.0, 20.0, 10.0, panels=(14, 5, 5)))
-    omega = np.array([0.3, 0.6, 0.8, irregular - 0.01, irregular, irregular + 0.01])
+    omega = np.array([0.3, 0.45, 0.6, 0.8, irregular - 0.01, irregular, irregular + 0.01])
     _, found, said = compute_hull(side, Loading(gm_m=0.8), "box", omega)
     assert said
     assert any(f"{irregular:.3g} rad/s" in text for text in said)
-    assert list(found.frequency_rad_s[:3]) == [0.3, 0.6, 0.8]
-    assert len(found.frequency_rad_s) == 6 - len(said)
+    assert list(found.frequency_rad_s[:4]) == [0.3, 0.45, 0.6, 0.8]
+    assert len(found.frequency_rad_s) == 7 - len(said)
 
 
 def test_a_barge_whose_roll_hardly_radiates_keeps_the_waves_it_rolls_in() -> None:
@@ -139,6 +139,27 @@ def test_a_barge_whose_roll_hardly_radiates_keeps_the_waves_it_rolls_in() -> Non
     _, found, said = compute_hull(side, Loading(gm_m=1.5, roll_period_s=8.0), "barge", omega)
     assert not said
     assert found.frequency_rad_s == pytest.approx(omega)
+
+
+@pytest.mark.parametrize("loading", [{"roll_period_s": 8.0}, {"gyration_m": 4.4}])
+@pytest.mark.parametrize(
+    ("first", "refused"), [([0.3, 0.6], True), ([0.3, 0.75], False), ([], True)]
+)
+def test_lost_frequencies_around_the_roll_are_refused(first, refused, loading, monkeypatch) -> None:
+    """The roll is at 0.785 rad/s; of seven frequencies 0.75 to 0.9 are lost, or all below 1."""
+    kept = np.array([*first, 1.0, 1.3, 1.6])
+    omega = np.unique([0.3, 0.6, 0.75, 0.9, *kept])
+    lost = np.setdiff1d(omega, kept)
+    monkeypatch.setattr(
+        compute, "energy_errors", lambda hull, _: np.isin(hull.frequency_rad_s, lost)[:, None]
+    )
+    side = cpt.Mesh(*box(60.0, 12.0, 3.5, panels=(14, 6, 4)))
+    if not refused:
+        assert len(compute_hull(side, Loading(gm_m=1.5, **loading), "barge", omega)[2]) == len(lost)
+        return
+    words = r"^frequency_rad_s has none near the free roll, 0\.7.*0\.9 rad/s.*finer panels"
+    with pytest.raises(MeshError, match=words):
+        compute_hull(side, Loading(gm_m=1.5, **loading), "barge", omega)
 
 
 def test_file_holds_the_ship_with_the_period_that_was_asked_for(tmp_path: Path) -> None:

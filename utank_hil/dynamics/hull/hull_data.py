@@ -200,10 +200,21 @@ def _asymmetry(matrix: FloatArray) -> float:
     return float(np.median(np.max(np.where(apart > noise, apart / scale, 0.0), axis=(-1, -2))))
 
 
+_WIDEST_GAP = (math.log(1.5) / 2) ** 2
+"""Of frequencies around the free roll: 1.5 from one to the next. Then the wave's moment is 6 to 10 %
+wrong in the middle (two ships, by WAMIT and VERES)."""
 LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
 _MIRRORED = np.array([1, -1, 1, -1, 1, -1])
 _MOST_TURN_DEG = 45.0
 """Between headings farther apart than this, forces are not known: seakeeping runs have 10 to 30."""
+
+
+class UncoveredError(ValueError):
+    """The data have no frequencies around the free roll; `gap` says where."""
+
+    def __init__(self, source: str, gap: str) -> None:
+        super().__init__(f"{source}: {gap}: compute the hull there, too")
+        self.gap = gap
 
 
 class FreeRoll(NamedTuple):
@@ -256,19 +267,25 @@ def excitation_at(hull: HullData, omega_rad_s: float, heading_deg: float) -> Com
 
 
 def free_roll(hull: HullData) -> FreeRoll:
-    """The free roll of the ship at rest; ValueError if a figure lacks or she is not stable."""
+    """The free roll of the ship at rest.
+
+    ValueError is raised if a figure lacks or she is not stable, UncoveredError if coefficients or
+    forces have no frequencies around it.
+    """
     ship = hull.about_gravity_centre()
     stiffness = float(ship.known("hydrostatic")[3, 3])
     if stiffness <= 0:
         raise ValueError(f"{hull.source}: C44 is {stiffness:.3g} N m/rad: GM must be positive")
     omega = math.sqrt(stiffness / (1.3 * ship.mass_matrix[3, 3]))  # hulls add a third in roll
+    least, most = ship.frequency_rad_s[[0, -1]]
     for _ in range(50):
-        added, damping = radiation_at(ship, omega)
+        added, damping = radiation_at(ship, min(max(omega, float(least)), float(most)))
         inertia = (ship.mass_matrix + added)[np.ix_(LATERAL, LATERAL)]
         mode = _mode(inertia)
         before, omega = omega, math.sqrt(stiffness / float(mode @ inertia @ mode))
         if abs(omega - before) < 1e-9 * omega:
             break
+    _refuse_gap(hull, omega)
     radiated = float(mode @ damping[np.ix_(LATERAL, LATERAL)] @ mode)
     return FreeRoll(2 * math.pi / omega, omega * radiated / (2 * stiffness), mode)
 
@@ -279,6 +296,7 @@ def with_roll_period(hull: HullData, period_s: float) -> HullData:
     ValueError is raised as by `free_roll`, and if the added mass alone makes the period longer.
     """
     ship, omega = hull.about_gravity_centre(), 2 * math.pi / period_s
+    _refuse_gap(hull, omega)
     stiffness = float(ship.known("hydrostatic")[3, 3])
     others = ship.mass_matrix + radiation_at(ship, omega)[0]
     others[3, 3] -= hull.known("inertia_kg_m2")[0, 0]
@@ -297,6 +315,22 @@ def _mode(inertia: FloatArray) -> FloatArray:
     others = np.ix_([0, 2], [0, 2])
     sway, yaw = -np.linalg.solve(inertia[others], inertia[[0, 2], 1])
     return np.array([sway, 1.0, yaw])
+
+
+def _refuse_gap(hull: HullData, roll_rad_s: float) -> None:
+    for name in ("frequency_rad_s", "wave_frequency_rad_s"):
+        grid = getattr(hull, name)
+        below, above = grid[grid <= 1.000001 * roll_rad_s], grid[grid >= 0.999999 * roll_rad_s]
+        if len(below) and len(above):
+            gap = math.log(roll_rad_s / below[-1]) * math.log(above[0] / roll_rad_s)
+            if gap <= _WIDEST_GAP:
+                continue
+        nearest = " and ".join(f"{each:.3g}" for each in (*below[-1:], *above[:1]))
+        raise UncoveredError(
+            hull.source,
+            f"{name} has none near the free roll, {roll_rad_s:.3g} rad/s "
+            f"({2 * math.pi / roll_rad_s:.3g} s); next to it {nearest}",
+        )
 
 
 def _inside(hull: HullData, name: str, grid: FloatArray, at: float) -> None:
