@@ -201,8 +201,8 @@ def _asymmetry(matrix: FloatArray) -> float:
 
 
 _WIDEST_GAP = (math.log(1.5) / 2) ** 2
-"""Of frequencies around the free roll: 1.5 from one to the next. Then the wave's moment is 6 to 10 %
-wrong in the middle (two ships, by WAMIT and VERES)."""
+"""Of frequencies around the free roll: 1.5 from one to the next. In its middle the wave's moment is
+then 6 to 10 % wrong (two ships, by WAMIT and VERES)."""
 LATERAL = np.array([1, 3, 5])  #: Sway, roll and yaw among the six degrees.
 _MIRRORED = np.array([1, -1, 1, -1, 1, -1])
 _MOST_TURN_DEG = 45.0
