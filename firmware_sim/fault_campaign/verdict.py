@@ -101,6 +101,19 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
     return None if time is None else getattr(outcome, time)
 
 
+def _instead(outcome: Outcome) -> str:
+    """What came in the place of the required reaction."""
+    times_ms = {
+        f"latched {outcome.code}": outcome.found,
+        "halved the pressure": outcome.halved,
+        "gave an alarm of the row": outcome.alarm,
+        "passed over a frame": outcome.noted,
+    }
+    done = [f"{what} after {ms:.0f} ms" for what, ms in times_ms.items() if ms is not None]
+    done += [f"alarms {' '.join(outcome.alarms)}"] if outcome.alarms else []
+    return ", ".join(done) or f"nothing, and ended in {outcome.mode}"
+
+
 def _found_limit_ms(row: Row, setup: Setup, outcome: Outcome) -> float | None:
     """Deadline in ms for the reaction; of an own ship by her roll budget, where it follows that."""
     if row.limit.found_ms is not None or row.limit.follows is None:
@@ -146,7 +159,7 @@ def _late(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
     found_ms = _reaction_ms(row, outcome)
     if row.expect.reaction not in ("none", "refuse"):
         if found_ms is None:
-            yield "was not found"
+            yield f"was not found; instead: {_instead(outcome)}"
         elif allowed_ms is not None and found_ms > allowed_ms:
             yield f"found after {found_ms:.0f} ms, {allowed_ms:.0f} allowed"
     if limit.halved_ms is not None:

@@ -120,10 +120,14 @@ def attempted(row: LiveRow, bus: str) -> tuple[list[str], LiveTimes]:
             problems = ["in charge again in the end"] if bench.in_charge else []
     except LiveError as error:
         return [str(error)], LiveTimes(None, None, 0.0)
-    judged_ms = times.found_ms if row.judged == "found" else times.zero_ms
-    end = f"; at the end {bench.mode!r}, {bench.fault or 'no fault'}, {bench.state!r}"
+    found, zero = (times.found_ms, "FAULT"), (times.zero_ms, "the drive stopped")
+    (judged_ms, _), (other_ms, other) = (found, zero) if row.judged == "found" else (zero, found)
+    mode, state = ("silent" if each is None else each.name for each in (bench.mode, bench.state))
+    end = f"; at the end {mode}, {bench.fault or 'no fault'}, the drive {state}"
     if judged_ms is None and not problems:
-        problems.append(("was not found" if row.judged == "found" else "the drive went on") + end)
+        instead = "" if other_ms is None else f"; instead: {other} after {other_ms:.0f} ms"
+        lacking = "was not found" if row.judged == "found" else "the drive went on"
+        problems.append(f"{lacking}{instead}{end}")
     elif judged_ms is not None and judged_ms > row.within_ms:
         problems.append(f"after {judged_ms:.0f} ms, {row.within_ms:.0f} allowed{end}")
     return problems, times

@@ -325,7 +325,8 @@ def test_where_nobody_arms_nothing_is_found():
     row = row_of("stop", inject=(fault,), from_start=True)
     outcome = outcome_of(row)
     assert outcome.code == "NONE"
-    assert "seed 1: was not found" in judged(CAMPAIGN, row, [outcome])["problems"]
+    (problem, *_) = judged(CAMPAIGN, row, [outcome])["problems"]
+    assert problem == f"seed 1: was not found; instead: nothing, and ended in {outcome.mode}"
 
 
 def test_first_difference_of_two_logs():

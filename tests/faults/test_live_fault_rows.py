@@ -1,6 +1,7 @@
 """What follows from the frames of a live bus: from logs made by hand."""
 
 from types import SimpleNamespace
+from typing import ClassVar
 
 import pytest
 
@@ -111,6 +112,35 @@ def test_only_a_start_that_the_machine_spoilt_is_made_again(missing_s, code, sta
         with pytest.raises(LiveError, match="OVERRUN"), rows.in_charge("vcan0"):
             raise AssertionError
     assert len(made) == starts
+
+
+@pytest.mark.parametrize(
+    ("judged", "times", "said"),
+    [
+        ("found", (None, 90.0), "was not found; instead: the drive stopped after 90 ms; at the"),
+        (
+            "zero",
+            (80.0, None),
+            "the drive went on; instead: FAULT after 80 ms; at the end FAULT, no fault",
+        ),
+        ("zero", (None, None), "the drive went on; at the end"),
+    ],
+)
+def test_what_happened_instead_is_said(monkeypatch, judged, times, said):
+    class Watched(Bench):
+        starts: ClassVar[list[Bench]] = []
+        mode, fault, state, in_charge = Mode.FAULT, "", OFF, False
+
+        def wait_in_charge(self):
+            pass
+
+        def watch(self, _):
+            return 1.0
+
+    monkeypatch.setattr(rows, "LiveBench", Watched)
+    monkeypatch.setattr(rows, "times_of", lambda *_, **__: LiveTimes(*times, 0.0))
+    row = rows.LiveRow(lambda _: None, 100.0, judged=judged)
+    assert rows.attempted(row, "vcan0")[0][0].startswith(said)
 
 
 @pytest.mark.parametrize(

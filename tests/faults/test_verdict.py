@@ -77,6 +77,24 @@ def test_each_reaction_asks_for_its_own():
     assert not spoken("held-arm-bit", replace(refused, was_active=True)).passed
 
 
+@pytest.mark.parametrize(
+    ("row", "change", "instead"),
+    [
+        ("roll-drift-slow",
+         {"found": 310.0, "mode": "FAULT", "code": "DRIFT", "alarms": ("DRIFT",)},
+         "latched DRIFT after 310 ms, alarms DRIFT"),
+        ("level-noise", {"halved": 50.0, "noted": 20.0},
+         "halved the pressure after 50 ms, passed over a frame after 20 ms"),
+        ("both-signs-flipped", {"alarm": 90.0}, "gave an alarm of the row after 90 ms"),
+        ("both-signs-flipped", {}, "nothing, and ended in ACTIVE"),
+    ],
+)  # fmt: skip
+def test_what_happened_instead_of_what_was_not_found_is_said(row, change, instead):
+    calm = replace(GOOD, mode="ACTIVE", found=None, code="NONE", alarms=())
+    problems = verdict(row, replace(calm, **change)).problems
+    assert f"seed 1: was not found; instead: {instead}" in problems
+
+
 def test_a_fault_that_is_latched_has_a_name_of_the_row():
     other = replace(GOOD, code="OVERRUN", alarm=600.0)
     assert spoken("both-signs-flipped", other).problems == ["seed 1: called OVERRUN"]

@@ -173,11 +173,9 @@ def size_tank(
 
 def _too_stiff(ship: RollShip, room: TankRoom) -> str:
     """Why no room helps a ship that is far stiffer than others of her breadth; else empty."""
+    gm_m = ship.stiffness_nm_rad / ship.displacement_n
     period_s = 2 * math.pi / ship.natural_frequency_rad_s
-    least_s, gm_m = (
-        STIFFEST * math.sqrt(room.breadth_m),
-        ship.stiffness_nm_rad / ship.displacement_n,
-    )
+    least_s = STIFFEST * math.sqrt(room.breadth_m)
     if period_s >= least_s and gm_m <= room.breadth_m / 4:
         return ""
     return (
