@@ -887,7 +887,7 @@ def with_own_drive():
 def test_rows_of_a_canopen_drive_run_on_a_ship_that_has_one():
     moved = CAMPAIGN.on(with_own_drive(), "gpc")
     rows = {row.id: row.fault.inject[0] for row in moved.rows if row.id.startswith("canopen")}
-    assert len(rows) == 9
+    assert len(rows) == 10
     assert rows["canopen-four-of-five-commands-lost"].id_11bit == 0x209
     assert rows["canopen-heartbeat-lost"].id_11bit == 0x709
     assert rows["canopen-controller-heartbeat-lost"].id_11bit == 0x778
