@@ -40,10 +40,17 @@ _TO_EVEN: Final = 6755399441055744.0
 _new: Final = tuple.__new__
 
 
+def _state_of(bits: int) -> DriveState | None:
+    few = bits & 0x4F  # in some states quick stop's bit does not count
+    return _STATES.get(few if few in (0x00, 0x40, 0x08, 0x0F) else bits & 0x6F)
+
+
+_BY_WORD: Final = [_state_of(bits) for bits in range(0x70)]
+
+
 def state_of(status_word: int) -> DriveState | None:
     """State by the status word 6041h; None for what the standard does not know."""
-    few = status_word & 0x4F  # in some states quick stop's bit does not count
-    return _STATES.get(few if few in (0x00, 0x40, 0x08, 0x0F) else status_word & 0x6F)
+    return _BY_WORD[status_word & 0x6F]
 
 
 class DriveReport(NamedTuple):
@@ -217,10 +224,9 @@ class CanopenDrive:
         # pragma: no mutate end
         self._count += 1
         content = word | (counts & (1 << bits) - 1) << 16
-        self._contents.pop(0)  # pragma: no mutate: it is the oldest one's place
-        self._sent_ns.pop(0)  # pragma: no mutate: the same
-        self._contents.append(content if self._marked else content >> 16)
-        self._sent_ns.append(self._now_ns)
+        place = self._count % KEPT  # the oldest one's
+        self._contents[place] = content if self._marked else content >> 16
+        self._sent_ns[place] = self._now_ns
         command = _new(Frame, (self._received, content.to_bytes(2 + bits // 8, "little")))
         # SYNC first: what it asks for is sampled before the command, whoever is in front on the bus
         return [*self._with, command]
@@ -258,7 +264,8 @@ class CanopenDrive:
         self._echo = echo
         # after SYNC it is a cycle old; else the middle of what its phase can be
         phase_ns = 0 if len(self._with) > 1 else _HALF_CYCLE_NS
-        for place in reversed(range(KEPT)):
+        for ago in range(KEPT):
+            place = (self._count - ago) % KEPT
             if self._contents[place] == echo:
                 self.echo_ns = self._sent_ns[place] - phase_ns
                 return

@@ -83,5 +83,9 @@ class Routing:
 
     def wakes(self, now_ns: int) -> list[Frame]:
         """What is to be sent to devices of other makers that are silent."""
-        frames = (device.wake(now_ns) for device in self._sources)
-        return [frame for frame in frames if frame is not None]
+        frames = []
+        for device in self._sources:
+            frame = device.wake(now_ns)
+            if frame is not None:
+                frames.append(frame)
+        return frames
