@@ -75,6 +75,7 @@ def bench(
     from firmware_sim.figures import figures
     from firmware_sim.report_page import REPORT_FILES, write_files
     from firmware_sim.scenario import Scenario, guard_problem
+    from utank_hil.console.loops import require_bus
 
     if bus is not None and not real_time:
         common.fail("--bus is for real time: add --realtime, or leave --bus out")
@@ -89,6 +90,8 @@ def bench(
             common.print_json({"file": str(fmu)})
         raise typer.Exit
     _refuse_faults(scenario, loaded, real_time=real_time, frames=frames)
+    if bus is not None:
+        require_bus(bus)
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     out = common.prepare_out(out, (*REPORT_FILES, *logs))
     laws = {

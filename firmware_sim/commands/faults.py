@@ -69,6 +69,7 @@ def faults(
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window
     from firmware_sim.fault_campaign.verdict import as_json, judged, write_recordings
+    from utank_hil.console.loops import require_bus
     from utank_hil.runners import stop_on_signals
 
     whole = load(campaign, Campaign)
@@ -76,7 +77,7 @@ def faults(
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen, live, not_run = _chosen(whole, loaded, names, full=full, on_bus=bus is not None)
     if bus is not None and live:
-        _open_once(bus)  # before minutes of other rows
+        require_bus(bus)  # before minutes of other rows
     window = Window() if full else Window(60.0, 20.0) if scenario is None else _window(loaded)
     if junit is not None:
         common.require_writable(junit, "--junit")  # before minutes of rows
@@ -169,13 +170,6 @@ def _chosen(
     if names and not (chosen or live):
         fail("--rows: nothing to run: tests show all of them, or the ship has none of these nodes")
     return chosen, live, not_run
-
-
-def _open_once(bus: str) -> None:
-    from utank_hil.canbus.socketcan import SocketCanPort
-
-    with common.failing(OSError, at=f"--bus {bus}", code=ExitCode.NO_BUS):
-        SocketCanPort(bus).close()
 
 
 def _run_live(names: Sequence[str], bus: str) -> "tuple[list[Verdict], End | None]":

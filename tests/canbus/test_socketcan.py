@@ -264,12 +264,27 @@ def test_an_interface_that_does_not_exist_is_named_at_once(buses):
     assert caught.value.errno == errno.ENODEV
 
 
+def test_an_interface_of_another_kind_is_refused_by_what_it_is():
+    with pytest.raises(PortError, match="CAN interface lo: is no CAN interface; ") as caught:
+        SocketCanPort("lo")
+    assert "Errno" not in str(caught.value.strerror)
+
+
+def test_interfaces_that_are_there_are_named(monkeypatch, tmp_path):
+    for name, kind in (("lo", "772"), ("vcan3", "280"), ("can1", "280")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "type").write_text(f"{kind}\n")
+    monkeypatch.setattr(socketcan, "_SYSFS", tmp_path)
+    with pytest.raises(PortError, match="can7: not found; there is can1, vcan3; plug in"):
+        SocketCanPort("can7")
+
+
 def test_a_kernel_without_can_is_a_port_error(monkeypatch, interfaces):
     def refuse(*args, **kwargs):
         raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
 
     monkeypatch.setattr(socketcan, "SocketcanBus", refuse)
-    with pytest.raises(PortError, match="modprobe can_raw"):
+    with pytest.raises(PortError, match=r"can0: Address family .*; .*: modprobe can_raw"):
         SocketCanPort("can0")
 
 

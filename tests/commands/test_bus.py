@@ -1,11 +1,16 @@
 """``utank-hil bus`` with a log: its table, its JSON, its exit codes."""
 
+import errno
 import json
+import time
+from pathlib import Path
 
+import can
 import pytest
 from others import others_file
 from typer.testing import CliRunner
 
+from utank_hil.canbus import socketcan
 from utank_hil.commands.bus import bus
 from utank_hil.console.common import new_app
 
@@ -55,6 +60,37 @@ def test_a_ship_that_is_not_there_is_missed():
     told = json.loads(done.stdout)
     assert {each["kind"] for each in told["problems"]} == {"missing"}
     assert any("SENSOR_MOTION" in each["text"] for each in told["problems"])
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "said"),
+    [
+        (
+            can.CanOperationError("down", errno.ENETDOWN),
+            3,
+            "lo: down; bring it up: ip link set lo up",
+        ),
+        (None, 0, "nothing came in 0.5 s: check wiring, termination and bit rate"),
+    ],
+)
+def test_an_interface_that_is_down_or_silent_is_said(monkeypatch, failure, code, said):
+    class Bus:
+        def __init__(self, *_, **__):
+            pass
+
+        def recv(self, timeout_s):
+            if failure:
+                raise failure
+            time.sleep(timeout_s)
+
+        def shutdown(self):
+            pass
+
+    monkeypatch.setattr(socketcan, "SocketcanBus", Bus)
+    monkeypatch.setattr(socketcan, "_SYSFS", Path("nowhere"))
+    done = invoke("lo", "--seconds", "0.5")
+    assert done.exit_code == code
+    assert said in done.output
 
 
 @pytest.mark.parametrize(("place", "code"), [("nowhere.log", 2), ("nocan9", 3)])

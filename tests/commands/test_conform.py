@@ -43,6 +43,9 @@ def drive(monkeypatch):
         def __init__(self, channel, *, standard, receive_only):
             assert (channel, standard, receive_only) == ("can0", True, False)
 
+        def receive(self):
+            return ()
+
         def close(self): ...
 
     class Loop:

@@ -50,8 +50,19 @@ def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
     words = ["run", str(GPC), "--bus", "any0", "--duration", "0.3", "--json"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == ExitCode.BUS_LOST
+    assert "the bus does not work yet: down" in result.stderr
     report = json.loads(result.stdout)
     assert (report["exit_code"], report["fault"]) == (ExitCode.BUS_LOST, "BUS_LOST")
+
+
+@pytest.mark.parametrize("words", [["bench", "--realtime"], ["faults"]])
+def test_a_bench_on_a_bus_that_is_down_is_not_begun(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str]
+) -> None:
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", DeadBus)
+    result = CliRunner().invoke(app, [*words, "--bus", "any0", "--out", str(tmp_path / "out")])
+    assert result.exit_code == ExitCode.NO_BUS
+    assert result.stderr.splitlines()[-1] == "error: --bus any0: down"
 
 
 def test_run_that_is_ended_before_its_first_tick_ends_in_words(

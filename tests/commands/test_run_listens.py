@@ -26,6 +26,13 @@ class OccupiedBus(ports.QuietBus):
         self.sent.append(frame)
 
 
+def test_a_bus_on_which_nobody_sends_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("utank_hil.canbus.socketcan.SocketCanPort", ports.QuietBus)
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "vcan7", "--duration", "0.1"])
+    said = "vcan7: nothing came in 0.35 s: check wiring, termination and bit rate"
+    assert said in " ".join(result.stderr.split())
+
+
 def test_a_second_controller_is_refused_before_it_has_sent_a_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -581,7 +581,7 @@ def test_a_bus_that_is_none_is_said_before_any_row_is_run(monkeypatch):
 
 @pytest.fixture
 def _vcan7(monkeypatch):
-    monkeypatch.setattr(commands, "_open_once", lambda _: None)
+    monkeypatch.setattr("utank_hil.console.loops.require_bus", lambda _: None)
 
 
 @pytest.mark.usefixtures("_vcan7")

@@ -9,6 +9,7 @@ MOST_BUSES: Final = 4  #: Two motion sensors, drive and its own.
 OTHER_BUS: Final = 1 << BUS_SHIFT  #: Identifiers from here on are of other interfaces.
 LONGEST_ID: Final = (1 << 29) - 1
 LONGEST_STANDARD_ID: Final = (1 << 11) - 1
+CHECK_BUS: Final = "check wiring, termination and bit rate"
 
 
 class Frame(NamedTuple):

@@ -5,12 +5,14 @@ start of its tick and sends at the end, so a loop that hangs is silent on the bu
 """
 
 import errno
+import re
 import socket
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Final
 
-from utank_hil.canbus.frame import LONGEST_ID, STANDARD, Frame, PortError
+from utank_hil.canbus.frame import CHECK_BUS, LONGEST_ID, STANDARD, Frame, PortError
 from utank_hil.canbus.line_names import LINE_REMEDY, LINES, SERIAL_REMEDY, SLCAN
 from utank_hil.canbus.python_can import SocketcanBus, can
 from utank_hil.canbus.sentence_line import STRANGER, SentenceLine
@@ -22,8 +24,6 @@ _GONE: Final = (errno.ENODEV, errno.ENXIO)
 _CREATE: Final = "plug in the adapter, or create the interface; a vcan0 without root: tools/vcan"
 _REMEDIES: Final = {
     errno.ENETDOWN: "bring it up: ip link set {channel} up",
-    errno.ENODEV: _CREATE,
-    errno.ENXIO: _CREATE,
     errno.ENOBUFS: "transmit queue full: no node acknowledges, or the bus is overloaded",
     errno.EAFNOSUPPORT: "the kernel has no CAN: modprobe can_raw",
 }
@@ -42,7 +42,8 @@ _CONTROLLER_PROBLEMS: Final = {
     0x10: "error-passive on receiving",
     0x20: "error-passive on sending",
 }
-_CHECK_BUS: Final = "check wiring, termination and bit rate"
+_SYSFS, _CAN_TYPE = Path("/sys/class/net"), "280"  # ARPHRD_CAN, an interface's own word
+_NUMBER: Final = re.compile(r"\[Errno -?[0-9]+\] | \[Error Code -?[0-9]+\]")
 
 
 def open_bus(
@@ -54,25 +55,60 @@ def open_bus(
 ) -> can.BusABC:
     """A CAN interface, a serial adapter that `listens` without acknowledging, or a line.
 
-    Of a line it is the sensor's end that `emulates`. OSError is raised if there is none.
+    Of a line it is the sensor's end that `emulates`. PortError is raised if there is none.
     """
-    if name.startswith(LINES):
-        try:
-            return SentenceLine(name, sends=emulates)
-        except OSError as error:
-            raise OSError(f"{error}; {LINE_REMEDY}") from error
-    if name.startswith(SLCAN):
-        from utank_hil.canbus.slcan import SerialBus  # here: pyserial need not be there
-
-        try:
-            return SerialBus(name, listens=listens, can_filters=filters)
-        except (can.CanError, OSError, ValueError) as error:
-            raise OSError(f"{error}; {SERIAL_REMEDY}") from error
     try:
-        socket.if_nametoindex(name)  # python-can leaks its socket if it can't bind it
-    except OSError as error:
-        raise OSError(errno.ENODEV, f"no interface {name}") from error
-    return SocketcanBus(name, receive_own_messages=False, can_filters=filters)
+        if name.startswith(LINES):
+            return SentenceLine(name, sends=emulates)
+        if name.startswith(SLCAN):
+            from utank_hil.canbus.slcan import SerialBus  # here: pyserial need not be there
+
+            return SerialBus(name, listens=listens, can_filters=filters)
+        if why := _why_none(name):  # python-can leaks its socket if it can't bind it
+            raise _worded(name, why, _create(), errno.ENODEV)
+        return SocketcanBus(name, receive_own_messages=False, can_filters=filters)
+    except PortError:
+        raise
+    except (can.CanError, OSError, ValueError) as error:
+        raise port_error(name, error) from error
+
+
+def port_error(channel: str, error: Exception) -> PortError:
+    """What is wrong with an interface or line, with the remedy."""
+    number = getattr(error, "error_code", None) or getattr(error, "errno", None)
+    said = _NUMBER.sub("", getattr(error, "strerror", None) or str(error))
+    if channel.startswith(LINES):
+        return _worded(channel, said, LINE_REMEDY)
+    if channel.startswith(SLCAN):
+        return _worded(channel, said, SERIAL_REMEDY)
+    remedy = _create() if number in _GONE else _REMEDIES.get(number or 0, CHECK_BUS)
+    return _worded(channel, said, remedy, number)
+
+
+def _worded(channel: str, what: str, remedy: str, number: int | None = None) -> PortError:
+    kind = "line" if channel.startswith(LINES) else "CAN interface"
+    text = f"{kind} {channel}: {what}; {remedy.format(channel=channel)}"
+    return PortError(text) if number is None else PortError(number, text)
+
+
+def _why_none(name: str) -> str:
+    """Why a name is none of a CAN interface; empty if it is one, or that can't be told."""
+    try:
+        socket.if_nametoindex(name)
+    except OSError:
+        return "not found"
+    return "is no CAN interface" if _type(name) not in ("", _CAN_TYPE) else ""
+
+
+def _type(name: str) -> str:
+    with suppress(OSError):
+        return Path(_SYSFS, name, "type").read_text(encoding="ascii").strip()
+    return ""
+
+
+def _create() -> str:
+    there = sorted(each.name for each in _SYSFS.glob("*") if _type(each.name) == _CAN_TYPE)
+    return f"there is {', '.join(there)}; {_CREATE}" if there else _CREATE
 
 
 class SocketCanPort:
@@ -180,12 +216,7 @@ class SocketCanPort:
         if self._closed:
             raise self._port_error("closed", "open a new port")
         if self._bus is None:
-            try:
-                self._bus = open_bus(self.channel, self._filters, emulates=self._emulates)
-            except OSError as error:
-                if error.errno == errno.ENODEV:
-                    raise self._port_error("not found", _CREATE, errno.ENODEV) from error
-                raise self._failure(error) from error
+            self._bus = open_bus(self.channel, self._filters, emulates=self._emulates)
         return self._bus
 
     def _problem(self, message: can.Message) -> PortError | None:
@@ -198,7 +229,7 @@ class SocketCanPort:
         for bits, meanings in ((classes, _ERROR_CLASSES), (detail, _CONTROLLER_PROBLEMS)):
             for bit, meaning in meanings.items():
                 if bits & bit:
-                    return self._port_error(meaning, _CHECK_BUS)
+                    return self._port_error(meaning, CHECK_BUS)
         return None
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
@@ -207,16 +238,11 @@ class SocketCanPort:
             with suppress(can.CanError, OSError):  # its port may be gone
                 self._close_bus()
             self._bus = None
-            remedy = LINE_REMEDY if self._line else SERIAL_REMEDY
-            return self._port_error(str(error).removesuffix(f"; {remedy}"), remedy)
-        if number in _GONE:
+        elif number in _GONE:
             self._close_bus()
-        if number == errno.ENETDOWN:
+        elif number == errno.ENETDOWN:
             self._down, self._drained = True, False  # frames of before may still be queued
-        remedy = _REMEDIES.get(number or 0, _CHECK_BUS)
-        return self._port_error(str(error), remedy, number)
+        return port_error(self.channel, error)
 
-    def _port_error(self, what: str, remedy: str, number: int | None = None) -> PortError:
-        kind = "line" if self._line else "CAN interface"
-        text = f"{kind} {self.channel}: {what}; {remedy.format(channel=self.channel)}"
-        return PortError(text) if number is None else PortError(number, text)
+    def _port_error(self, what: str, remedy: str) -> PortError:
+        return _worded(self.channel, what, remedy)

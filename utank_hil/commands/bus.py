@@ -8,13 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.base.text_files import TextFileError
+from utank_hil.canbus.frame import CHECK_BUS
 from utank_hil.canbus.line_names import DEFAULT_BIT_RATE, LINES, SLCAN
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.common import Json, argument, failing, load, option, print_json
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.console.terminal import Terminal, new_table
+from utank_hil.console.terminal import Terminal, new_table, notes
 from utank_hil.telemetry.bus_census import BusCensus
 from utank_hil.telemetry.bus_files.frame import BusFrame, BusLogError, of_message
 from utank_hil.telemetry.bus_files.log import READ, BusLog
@@ -53,6 +54,8 @@ def bus(
         for message in BusLog(Path(place), channel).frames() if log else _heard(place, seconds):
             census.take(message)
     problems = census.problems()
+    if not log and not census.rows():
+        notes.say(f"nothing came in {seconds:g} s: {CHECK_BUS}", yellow=f"{place}:")
     if json_:
         print_json(_as_json(census, problems))
     else:
@@ -73,7 +76,8 @@ def _ship(path: Path | None) -> tuple[Vessel | None, int | None]:
 
 
 def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
-    from utank_hil.canbus.socketcan import open_bus
+    from utank_hil.canbus.python_can import can
+    from utank_hil.canbus.socketcan import open_bus, port_error
 
     listening = open_bus(interface, listens=True)
     listening_ends = time.monotonic() + seconds
@@ -81,6 +85,8 @@ def _heard(interface: str, seconds: float) -> Iterator[BusFrame]:
         while (left_s := listening_ends - time.monotonic()) > 0:
             if (message := listening.recv(left_s)) is not None:
                 yield of_message(message, interface)
+    except can.CanError as error:
+        raise port_error(interface, error) from error
     finally:
         listening.shutdown()
 

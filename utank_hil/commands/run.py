@@ -15,6 +15,7 @@ from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import claimed_files
 from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.frame import CHECK_BUS
 from utank_hil.canbus.ports import BusPorts, open_port, why_other_bit_rate
 from utank_hil.commands.announcer import LOG_NAME, Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
@@ -201,10 +202,11 @@ def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
         catalogue.codec(message).can_id for message in (canbus.ControllerStatus, canbus.PumpCommand)
     }
     sent.add(catalogue.receiver(canbus.Heartbeat, canbus.Address.CONTROLLER).can_id)
-    until_s = time.monotonic() + LISTEN_S
+    until_s, silent = time.monotonic() + LISTEN_S, True
     while time.monotonic() < until_s:
         with suppress(canbus.PortError):  # The loop meets it, too.
             for frame in port.receive():
+                silent = False
                 if frame.can_id in sent:
                     common.fail(
                         f"{bus}: another controller is on this bus: it sent 0x{frame.can_id:08X}; "
@@ -212,6 +214,8 @@ def _refuse_beside_another(port: canbus.Port, bus: str) -> None:
                         ExitCode.NO_BUS,
                     )
         time.sleep(_LOOK_S)
+    if silent and not port.others:
+        notes.say(f"nothing came in {LISTEN_S:g} s: {CHECK_BUS}", yellow=f"{bus}:")
 
 
 @contextmanager

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import TypeVar
 
-from utank_hil.canbus import Port
-from utank_hil.console.common import failing
+from utank_hil.canbus import Port, PortError
+from utank_hil.console.common import failing, why
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import notes
 from utank_hil.runners import real_time_scheduling, stop_on_signals
@@ -19,7 +19,22 @@ def opened(opens: Callable[[], PortT]) -> Iterator[tuple[PortT, Callable[[], boo
     with failing(OSError, code=ExitCode.NO_BUS):
         port = opens()
     with closing(port), stop_on_signals() as stop:
+        try:
+            port.receive()  # frames of before are not judged
+        except PortError as error:  # it may come back: what runs judges that
+            notes.say(why(error), yellow="the bus does not work yet:")
         yield port, stop
+
+
+def require_bus(bus: str) -> None:
+    """End the command if nothing can be heard on a bus now."""
+    from utank_hil.canbus.socketcan import SocketCanPort
+
+    with (
+        failing(OSError, at=f"--bus {bus}", code=ExitCode.NO_BUS),
+        closing(SocketCanPort(bus)) as port,
+    ):
+        port.receive()
 
 
 @contextmanager
