@@ -539,8 +539,13 @@ def test_the_native_panel_of_that_station_does_not_arm(theirs):
     assert bench.node.mode is Mode.STANDBY
 
 
-def conformed(theirs, role, device, moves, key=b""):
-    """A trial of an emulated device; a person does what is asked in two seconds."""
+def conformed(*asked, **changes):
+    """What a trial of an emulated device finds wrong."""
+    return {each.name for each in tried(*asked, **changes) if not each.passed}
+
+
+def tried(theirs, role, device, moves, key=b"", spoil=lambda frame: frame):
+    """Checks of an emulated device; a person does what is asked in two seconds."""
     bench = Bench(theirs(**{role: device}))
     vessel = bench.ship.vessel
     plan = vessel.devices.devices()[role].plan(ROLES[role], role, 0)
@@ -562,11 +567,11 @@ def conformed(theirs, role, device, moves, key=b""):
         off = asked and "off the bus" in asked[-1]
         for frame in node.tick(now_ns):
             if frame.can_id >= own and not off:
-                trial.receive(frame._replace(can_id=frame.can_id & (own - 1)), now_ns)
+                trial.receive(spoil(frame._replace(can_id=frame.can_id & (own - 1))), now_ns)
         for frame in trial.tick(now_ns):
             node.receive(frame._replace(can_id=frame.can_id | own), now_ns)
         now_ns += SECOND_NS // 100
-    return {each.name for each in trial.checks if not each.passed}
+    return trial.checks
 
 
 def test_a_valve_conforms_and_one_that_is_slow_or_stays_where_it_is_does_not(theirs):
@@ -581,6 +586,38 @@ def test_a_valve_conforms_and_one_that_is_slow_or_stays_where_it_is_does_not(the
         valve._valve = replace(valve._valve, fail_position="shut")
 
     assert conformed(theirs, "valve", VALVE, stays) >= {"silence_ms"}
+
+
+class Stands:
+    """The first frame again and again."""
+
+    def __init__(self):
+        self.first = None
+
+    def __call__(self, frame):
+        self.first = self.first or frame
+        return self.first
+
+
+def altered(data):
+    return bytes([*data[:-1], data[-1] ^ 1])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "name", "remedy"),
+    [
+        (lambda frame: frame._replace(data=altered(frame.data)), "rejected", "keys wrong CRC or"),
+        (lambda frame: frame._replace(data=frame.data[:-1]), "rejected", "keys wrong length: comp"),
+        (Stands(), "rejected", "keys counter repeated: "),
+        (lambda frame: frame._replace(can_id=frame.can_id + 1), "heard", "Never heard: keys. Look"),
+    ],
+)  # fmt: skip
+def test_a_panel_that_says_it_wrong_is_refused_by_message_and_reason(theirs, spoil, name, remedy):
+    checks = tried(theirs, "panel", PANEL, lambda *_: None,
+                   spoil=lambda frame: spoil(frame) if len(frame.data) == 3 else frame)  # fmt: skip
+    wrong = {each.name: each.remedy for each in checks if not each.passed}
+    assert {"heard", name} == wrong.keys()
+    assert wrong[name].startswith(remedy)
 
 
 def test_check_says_what_protects_them_and_what_does_not(theirs, capsys):

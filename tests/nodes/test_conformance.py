@@ -1,6 +1,7 @@
 """Devices put through their profiles: emulated sensors, a drive that canopen plays, the bench's."""
 
 import math
+import re
 
 import pytest
 
@@ -30,7 +31,7 @@ def heel_rad(asked, since_s):
     return 0.05 * (1 - math.cos(math.pi * min(since_s / 2, 1))) if asked else 0.0
 
 
-def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
+def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False, late=False):
     """A trial of an emulated inertial sensor whose person takes three seconds a step."""
     plan = DevicesSection(motion=SBG).foreign().motions[0]
     catalogue, asked = load_catalogue(), []
@@ -40,7 +41,7 @@ def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
         asked.append(now_ns)
         return lambda: now_ns - asked[-1] > 3_000_000_000
 
-    trial, now_ns, tick = SensorTrial(plan, ask, 2.0), 0, 0
+    trial, now_ns, tick, held = SensorTrial(plan, ask, 2.0), 0, 0, []
     while not trial.done:
         assert tick < 6000
         since_s = (now_ns - asked[0]) * 1e-9 if asked else 0.0
@@ -49,8 +50,11 @@ def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
             before, after = (heel_rad(asked, max(since_s + d, 0)) for d in (-5e-3, 5e-3))
             roll, rate = heel_rad(asked, since_s), (after - before) * 100
             values = SensorMotion(sign * roll, rate_sign * rate, Quality.GOOD)
-            for frame in device.frames(values, now_ns, tick):
-                trial.receive(frame, now_ns + 1_000_000)
+            held += device.frames(values, now_ns, tick)
+            if not (late and tick % 50):  # each half a second they come together
+                for frame in held:
+                    trial.receive(frame, now_ns + 1_000_000)
+                held = []
         now_ns += TICK_NS
         tick += 1
         trial.tick(now_ns)
@@ -66,6 +70,10 @@ def sensor_trial(sign=1, rate_sign=1, every=1, repeats=False, silent=False):
         ({"repeats": True}, {"silence"}),
         ({"every": 2}, {"rate", "jitter"}),
         ({"silent": True}, {"heard"}),
+        (
+            {"late": True, "sign": 0},
+            {"late", "rate", "jitter", "gap", "roll_rad_sign", "roll_rate"},
+        ),
     ],
 )
 def test_a_sensor_conforms_or_what_is_wrong_is_named(changes, wrong):
@@ -167,6 +175,60 @@ def test_a_drive_that_stops_by_itself_has_no_time_to_stop():
     assert "raise heartbeat_ms" in check.remedy
 
 
+def at(can_id, change):
+    return lambda frame: change(frame) if frame.can_id & 0x7FF == can_id else [(0, frame)]
+
+
+def of(length):
+    """Cut to a length."""
+    return lambda frame: [(0, frame._replace(data=frame.data[:length]))]
+
+
+def stands(frame):
+    return [(0, frame._replace(data=frame.data[:2].ljust(len(frame.data), b"\0")))]
+
+
+def elsewhere(frame):
+    return [(0, frame._replace(can_id=frame.can_id + 1))]
+
+
+def later(milliseconds):
+    return lambda frame: [(milliseconds * 1_000_000, frame)]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "name", "words"),
+    [
+        (at(0x185, stands), "echo_ms", "another echo"),
+        (at(0x185, later(200)), "echo_ms", "what delays or loses PDOs"),
+        (at(0x185, of(-1)), "tpdo1", "50 came, 50 of them not of 6 bytes"),
+        (at(0x285, of(5)), "tpdo2", r"not of 7 bytes: compare COB-ID \(1801h:1\)"),
+        (at(0x185, elsewhere), "tpdo1", "0 came"),
+        (at(0x285, elsewhere), "tpdo2", "0 came"),
+        (at(0x705, of(0)), "heartbeat", "no controller arms: look at 1017h"),
+        (at(0x585, elsewhere), "set_up", "1000h:0 can't be read .*node number"),
+        (at(0x585, of(5)), "set_up", "1000h:0 can't be read"),
+        (at(0x585, later(400)), "set_up", "what loses or delays frames"),
+    ],
+)
+def test_a_drive_that_answers_wrongly_is_refused_by_what_it_says(spoil, name, words):
+    line = TrialLine()
+    receive, held = line.trial.receive, []
+
+    def spoiled(frame, now_ns):
+        held.extend((now_ns + late_ns, frame) for late_ns, frame in spoil(frame))
+        due = [each for each in held if each[0] <= now_ns]
+        held[:] = [each for each in held if each[0] > now_ns]
+        for _, frame in due:
+            receive(frame, now_ns)
+
+    line.trial.receive = spoiled
+    assert name in failed(line.run())
+    first = next(each for each in line.trial.checks if not each.passed)
+    assert first.name == name
+    assert re.search(words, first.remedy)
+
+
 def test_a_drive_whose_identity_can_be_written_is_found():
     line = TrialLine(tweak=lambda od: setattr(od[0x1018][1], "access_type", "rw"))
     assert "read_only" in failed(line.run())
@@ -210,7 +272,7 @@ def test_one_that_does_nothing_when_the_controller_dies_is_found():
 def test_its_times_are_those_of_the_pumps_pressure(mode):
     pressures_pa = []
     checks = emulated(mode, look=lambda *each: pressures_pa.append(each)).checks
-    measured_ms = [each.measured for each in checks if each.unit == "ms"]
+    measured_ms = [each.measured for each in checks if each.name.endswith(("stop_ms", "er_ms"))]
     ends = [k for k in range(1, len(pressures_pa)) if pressures_pa[k - 1][0] > pressures_pa[k][0]]
     assert len(measured_ms) == len(ends) == 2
     for time_ms, end in zip(measured_ms, ends, strict=True):

@@ -186,7 +186,7 @@ class ProfiledDevice(Generic[T]):
         messages = [
             MessageHeard(each, plan.age_ms, 1 << place) for place, each in enumerate(plan.messages)
         ]
-        self.watched: tuple[HeardMessage, ...] = tuple(messages)
+        self.watched: tuple[MessageHeard, ...] = tuple(messages)
         self._needed = [each for each in messages if each.needed]
         self._status = [each for each in messages if each.status]
         #: Whether a counter or a stamp tells a new measurement.

@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, Final
@@ -16,9 +17,10 @@ from utank_hil.canbus.profiles.device_plan import DevicePlan, MessageEncoder
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.valves import Valve
 from utank_hil.nodes.actuators import DriveSequence
-from utank_hil.nodes.canopen_drive import CanopenDrive, state_of
+from utank_hil.nodes.canopen_drive import KEPT, CanopenDrive, state_of
 from utank_hil.nodes.canopen_setup import CanopenSetup, SensorSetup
 from utank_hil.nodes.commissioning.checks import SETTLED_S, Check, stopped_ms
+from utank_hil.safety.safety_limits import SafetyLimits
 
 SECOND_NS: Final = 1_000_000_000
 RATE_SHARE: Final = 0.05
@@ -96,8 +98,10 @@ class Trial(ABC):
             yield self._frames()
 
     def _configure(self, setup: CanopenSetup) -> Script:
-        yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
-        why = setup.problem or "It does not answer: look at bus and node."
+        yield from self._wait(ANSWERED_S, lambda: setup.done or bool(setup.problem))
+        if not setup.unanswered:
+            yield from self._wait(CONFIGURED_S, lambda: setup.done or bool(setup.problem))
+        why = setup.problem or setup.unanswered or "Its answers by SDO come too slowly."
         self._flag("set_up", "configured by SDO, read back, started", why, right=setup.done)
 
     def _flag(self, name: str, what: str, remedy: str, *, right: bool) -> None:
@@ -133,19 +137,23 @@ class SensorTrial(Trial):
         if self._setup is not None:
             yield from self._configure(self._setup.setup)
         yield from self._wait(BACK_S, lambda: bool(self._heard))
-        rejected, lost, self._heard = self._rejected(), self._device.lost, []
+        rejected, late, lost = self._rejected(), self._late(), self._device.lost
+        self._heard = []
         yield from self._wait(self._listen_s)
         if self._heard:
             self._judge_pace()
         else:
-            remedy = (
-                "Look at power, bus, bit rate, and its identifiers or node: utank-hil bus --ship."
-            )
+            missing = [each.name for each in self._device.watched if not each.heard]
+            remedy = f"Never heard: {', '.join(missing)}. " if missing else ""
+            remedy += "Look at power, bus, bit rate, its identifiers or node: utank-hil bus --ship."
             self._flag("heard", "whole measurements come", remedy, right=False)
         self.checks += [
             Check("rejected", "frames of wrong length, checksum or order",
-                  self._rejected() - rejected, 0.0, 0.0, "1",
-                  "Compare the profile's layout with the device's; look for a second sender."),
+                  (self._rejected() - rejected).total(), 0.0, 0.0, "1",
+                  f"{', '.join(self._rejected() - rejected)}: compare the profile's layout with "
+                  "the device's; look for a second sender."),
+            Check("late", "frames that came too late by their stamp", self._late() - late, 0.0,
+                  0.0, "1", "Look at what holds frames up, as a gateway; compare stamps[].us."),
             Check("lost", "measurements lost by the counter",
                   (self._device.lost - lost) / max(len(self._heard), 1), 0.0, LOST_SHARE, "1",
                   "Look at cables, termination and load: utank-hil bus. A counter of all "
@@ -175,8 +183,15 @@ class SensorTrial(Trial):
         for move in MOVES[self._plan.kind]:
             yield from self._move(*move)
 
-    def _rejected(self) -> int:
-        return sum(sum(each.rejected.values()) for each in self._device.watched)
+    def _rejected(self) -> Counter[str]:
+        """Frames that were rejected, by message and reason."""
+        return Counter({
+            f"{each.name} {why.value}": count
+            for each in self._device.watched for why, count in each.rejected.items()
+        })  # fmt: skip
+
+    def _late(self) -> int:
+        return sum(each.stamp.late for each in self._device.watched if each.stamp is not None)
 
     def _usable(self, message: tuple[Any, ...]) -> bool:
         if isinstance(message, canbus.OperatorCommand):  # it is delivered only if it is usable
@@ -286,7 +301,10 @@ class ValveTrial(SensorTrial):
 
 SHARE: Final = 0.2  #: Of the greatest torque or speed, for a second: it moves the water by little.
 TURN_S: Final = 1.0
-CONFIGURED_S: Final = 15.0  #: Some forty entries at 0.3 s each, as slow as a server may be.
+VARIES: Final = 0.05  #: Of it, from command to command: each echo is then that of one alone.
+HEARD_SHARE: Final = 0.2  #: Of frames in `TURN_S`: so many may be missing, or be more.
+ANSWERED_S: Final = 10.0  #: For a node to answer at all, that is tried every two seconds.
+CONFIGURED_S: Final = 36.0  #: Forty entries, three answers each of 0.3 s, as slow as they may be.
 STATE_S: Final = 2.0  #: For a change of state; a drive that charges its capacitors takes one.
 IDENTITY: Final = cia.Place(0x1018, 1)  #: Read-only by CiA 301.
 _ENABLED: Final = canbus.DriveState.OPERATION_ENABLED
@@ -303,6 +321,7 @@ class DriveTrial(Trial):
         self._answer: cia.Answer | None = None
         self._state: canbus.DriveState | None = None
         self._speed_rad_s = math.nan
+        self._beats = self._count = 0
         super().__init__(ask)
 
     def receive(self, frame: canbus.Frame, now_ns: int) -> None:
@@ -316,6 +335,8 @@ class DriveTrial(Trial):
             self._state = self._drive.state
         elif cob == cia.SENT_2:
             self._speed_rad_s = self._drive.speed_rad_s
+        elif cob == cia.HEARTBEAT:
+            self._beats += len(frame.data) == 1
         elif cob == cia.SDO_ANSWER and (got := cia.answer(frame.data)) is not None:
             self._answer = got
             if got.place == cia.STATUS_WORD and got.value is not None:
@@ -341,7 +362,9 @@ class DriveTrial(Trial):
         return [*self._command()[1:-1], self._request(cia.read_request(place))]
 
     def _command(self) -> list[canbus.Frame]:
-        return self._drive.follow(self._target if self._pushes else 0.0, self._word)
+        self._count += 1
+        target = self._target * (1 - VARIES * (self._count % KEPT) / KEPT)
+        return self._drive.follow(target if self._pushes else 0.0, self._word)
 
     def _request(self, data: bytes) -> canbus.Frame:
         return canbus.Frame(self._tag | cia.SDO_REQUEST + self._plan.node, data)
@@ -353,11 +376,32 @@ class DriveTrial(Trial):
         if not self._drive.setup.done:
             return
         yield from self._wait(STATE_S, lambda: self._state is canbus.DriveState.SWITCH_ON_DISABLED)
+        yield from self._hear()
+        if not all(each.passed for each in self.checks):  # what follows is judged by these
+            return
         yield from self._refusals()
         yield from self._stop("quick_stop", "quick stop to standstill", speaks=True)
         yield from self._stop(
             "lost_controller", "controller's last frame to standstill", speaks=False
         )
+
+    def _hear(self) -> Script:
+        """Count for a second what it sends by itself."""
+        watched, beats = self._drive.watched, self._beats
+        before = [(each.heard, sum(each.rejected.values())) for each in watched]
+        yield from self._wait(TURN_S)
+        due = 1e3 * TURN_S / self._plan.heartbeat_ms
+        remedy = "Without its heartbeat no controller arms: look at 1017h, and what loses frames."
+        self.checks.append(Check("heartbeat", "heartbeats a second", self._beats - beats, due,
+                                 HEARD_SHARE * due, "1", remedy))  # fmt: skip
+        due = 1e3 * TURN_S / cia.COMMAND_MS
+        for number, (each, (heard, wrong)) in enumerate(zip(watched, before, strict=True)):
+            came, bad = each.heard - heard, sum(each.rejected.values()) - wrong
+            name = f"TPDO{number + 1} {each.can_id & STANDARD - 1:#x}"
+            remedy = (f"{came} came, {bad} of them not of {each.length} bytes: compare COB-ID "
+                      f"({0x1800 + number:X}h:1) and mapping ({0x1A00 + number:X}h).")  # fmt: skip
+            self.checks.append(Check(f"tpdo{number + 1}", f"whole frames a second of {name}",
+                                     came - bad, due, HEARD_SHARE * due, "1", remedy))  # fmt: skip
 
     def _refusals(self) -> Script:
         self._word = canbus.ControlWord.ENABLE_OPERATION
@@ -384,7 +428,16 @@ class DriveTrial(Trial):
             self._flag(f"{name}_enabled", "it can be enabled", remedy, right=False)
             return
         self._pushes = True
-        yield from self._wait(TURN_S)
+        yield from self._wait(TURN_S / 2)  # a demand may be on its way
+        ages_ms, end_ns = [0.0], self.now_ns + round(TURN_S / 2 * SECOND_NS)
+        while self.now_ns < end_ns:
+            ages_ms.append((self.now_ns - self._drive.echo_ns) * 1e-6)
+            yield self._frames()
+        if speaks:
+            age_ms = max(ages_ms) if max(ages_ms) < 1e3 * TURN_S else math.nan
+            remedy = "Choose another echo in the ship's file; look at what delays or loses PDOs."
+            self.checks.append(Check("echo_ms", "oldest command whose echo was the last", age_ms,
+                                     0.0, SafetyLimits().echo_age_ms, "ms", remedy))  # fmt: skip
         if self._state is not _ENABLED:
             self._pushes, self._word = False, canbus.ControlWord.DISABLE_VOLTAGE
             remedy = (f"It stopped by itself, {self._drive.words}: read its fault; raise "
