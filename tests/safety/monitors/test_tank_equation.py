@@ -218,6 +218,24 @@ def test_levels_that_stand_still_are_not_called_swapped(shift_s):
     assert Finding.WATER_SIGN not in found
 
 
+def test_levels_that_stand_still_are_not_called_a_delay():
+    """Gauges that stop make the roll look late at first."""
+    called = []
+    for shift_s in (0.0, 2.5, 5.0, 7.5):
+        for pressure_pa in (0.0, 5e3, 20e3):
+            for frequency_rad_s in (0.45, 0.6, 0.75):
+                ship = MovingShip(math.radians(2.0), pressure_pa, frequency_rad_s)
+                at_m = ship.level_m(FAULT_S + shift_s)
+
+                def stick(t, roll, level, pressure, at_m=at_m, shift_s=shift_s):
+                    return roll, at_m if t >= FAULT_S + shift_s else level, pressure
+
+                found = found_after(ship, stick, 20.0)
+                assert Finding.LEVEL_STUCK in found
+                called.append(Finding.MOTION_LATE in found)
+    assert not any(called)
+
+
 @pytest.mark.parametrize("stands_deg", [0.0, 1.4])
 @pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
 def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(pressure_pa, stands_deg):

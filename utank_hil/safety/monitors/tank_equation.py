@@ -252,7 +252,7 @@ class TankEquation:
             each.restart()
         self.slope_push = 0.0
         self._forget_lead()
-        self._still = self._level_still = 0
+        self._still = self._level_still = self._late = 0
         self._roll_rad = self._level_m = math.inf
         self.doubt = self.level_gain = self.late_s = math.nan
 
@@ -382,7 +382,11 @@ class TankEquation:
             most = self._most_unmoved / math.sqrt(1 - self._keep) + spread
             if unsteady > most * most:
                 found |= Finding.ROLL_STUCK
-        return found | Finding.MOTION_LATE if self._is_late() else found
+        self._late = self._late + 1 if self._is_late() else 0
+        # gauges that stop make the roll look late at first
+        if self._late > self._crest_samples >= self._level_still:
+            found |= Finding.MOTION_LATE
+        return found
 
     def _judge_signs(self, sound: float, unsteady: float) -> int:
         """Judge signs and a delay of a quarter of a period, by what the sound case leaves."""
@@ -406,14 +410,16 @@ class TankEquation:
             if enough
         ]
         found, most_uu = 0, self._sound.uu
-        moves = self._level_still <= self._crest_samples
         # a part of a wave tells less: as an average of as many samples
         filled = math.sqrt(self._sound.weight * (1 - self._keep))
         best = min([other for other, *_ in judged], default=0.0)
         for other, left, power, uu, finding in sorted(judged, reverse=True):
             least_uu = most_uu if self._band is None else min(uu, most_uu)
             doubt = filled * self._excess(left, other, power, least_uu)
-            clearly = 1.0 if finding == Finding.MOTION_LATE else self._clearly
+            late = finding == Finding.MOTION_LATE
+            clearly = 1.0 if late else self._clearly
+            # a level that stops looks late in half the time
+            moves = self._level_still <= self._crest_samples // (2 if late else 1)
             if moves and doubt > 1 and other <= clearly * best:
                 found = found & Finding.MOTION_LATE | finding  # of two signs that which leaves less
             self.doubt = max(doubt, self.doubt)  # of NaN it is the first one
